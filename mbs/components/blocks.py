@@ -35,7 +35,7 @@ class SignalBlock(Custom):
             )
 
     def _number(self, name: str) -> float | None:
-        """Return the numeric value of a parameter; None if it is symbolic or left out."""
+        """Return the numeric value of the parameter `name`; None if it is symbolic or left out."""
         given = getattr(self, name)
         return None if given is None else to_float(given)
 
@@ -77,7 +77,11 @@ class Constant(SignalBlock):
     y = custom.output()
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": value}."""
+        """Return {"y": value}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"y": at.value}
 
 
@@ -93,7 +97,11 @@ class Gain(SignalBlock):
     y = custom.output()
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": k u}."""
+        """Return {"y": k u}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"y": at.k * at.u}
 
 
@@ -134,7 +142,11 @@ class Sum(SignalBlock):
         return ("u1", "u2", "u3", "u4")[: len(self.weights)]
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": sum of weight times input}."""
+        """Return {"y": sum of weight times input}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         pairs = zip(self.weights, self.input_names, strict=True)
         return {"y": sum((to_sx(w, at.symbols) * getattr(at, u) for w, u in pairs), SX(0))}
 
@@ -166,7 +178,11 @@ class Limiter(SignalBlock):
         self._require_order()
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": u limited to the range from low to high}."""
+        """Return {"y": u limited to the range from low to high}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"y": saturate(at.u, at.low, at.high, at.width)}
 
 
@@ -186,11 +202,19 @@ class Integrator(SignalBlock):
     y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"x": k u}."""
+        """Return {"x": k u}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"x": at.k * at.u}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": x}."""
+        """Return {"y": x}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"y": at.x}
 
 
@@ -209,11 +233,19 @@ class FirstOrder(SignalBlock):
     y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"x": (k u - x) / time}."""
+        """Return {"x": (k u - x) / time}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"x": (at.k * at.u - at.x) / at.time}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": x}."""
+        """Return {"y": x}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"y": at.x}
 
 
@@ -235,12 +267,20 @@ class SecondOrder(SignalBlock):
     y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"x": v, "v": w^2 (k u - x) - 2 damping w v}."""
+        """Return {"x": v, "v": w^2 (k u - x) - 2 damping w v}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         pull = at.w**2 * (at.k * at.u - at.x)
         return {"x": at.v, "v": pull - 2 * at.damping * at.w * at.v}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": x}."""
+        """Return {"y": x}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"y": at.x}
 
 
@@ -265,12 +305,20 @@ class RateLimiter(SignalBlock):
     y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"x": (u - x) / time limited to the range from -falling to rising}."""
+        """Return {"x": (u - x) / time limited to the range from -falling to rising}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         down = at.rising if at.falling is None else at.falling
         return {"x": saturate((at.u - at.x) / at.time, -down, at.rising, at.width)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": x}."""
+        """Return {"y": x}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"y": at.x}
 
 
@@ -319,6 +367,9 @@ class ErrorController(SignalBlock):
         """Return {"x": ki e, plus (u - u0) / tracking if the output has limits}.
 
         u is the limited output and u0 the output before the limits.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         rate = at.ki * (at.target - at.measured)
         if at.low is not None or at.high is not None:
@@ -327,7 +378,11 @@ class ErrorController(SignalBlock):
         return {"x": rate}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"u": output, limited to the range from low to high}."""
+        """Return {"u": output, limited to the range from low to high}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"u": self._saturate(at)}
 
     def _saturate(self, at: Any) -> SX:
@@ -357,6 +412,7 @@ class PI(ErrorController):
     x = custom.state()
 
     def _command(self, at: Any) -> SX:
+        """Return kp e + x, the output before the limits."""
         return SX(at.kp * (at.target - at.measured) + at.x)
 
 
@@ -385,11 +441,16 @@ class PID(ErrorController):
     f = custom.state()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rates of the integral part "x" and of the filtered error "f"."""
+        """Return the rates of the integral part "x" and of the filtered error "f".
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         error = at.target - at.measured
         return {**ErrorController.rates(self, at), "f": (error - at.f) / at.filter}
 
     def _command(self, at: Any) -> SX:
+        """Return kp e + x + kd (e - f) / filter, the output before the limits."""
         error = at.target - at.measured
         return SX(at.kp * error + at.x + at.kd * (error - at.f) / at.filter)
 
@@ -403,11 +464,19 @@ class SampledBlock(SignalBlock):
     left = custom.state("s")
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"left": -1}: the time to the next sample decreases by one second per second."""
+        """Return {"left": -1}: the time to the next sample decreases by one second per second.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"left": SX(-1)}
 
     def events(self, at: Any) -> Mapping[str, Event]:
-        """Return the event "samples" at left = 0, which resets `left` and sets sampled modes."""
+        """Return the event "samples" at left = 0, which resets `left` and sets sampled modes.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"samples": Event(at.left, {"left": at.period, **self._sample(at)})}
 
     def _sample(self, at: Any) -> Mapping[str, SX]:
@@ -428,10 +497,15 @@ class SampleHold(SampledBlock):
     sample = custom.mode()
 
     def _sample(self, at: Any) -> Mapping[str, SX]:
+        """Return {"sample": u}."""
         return {"sample": at.u}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": u at the last sampling instant}."""
+        """Return {"y": u at the last sampling instant}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"y": at.sample}
 
 
@@ -469,6 +543,7 @@ class SampledPID(SampledBlock):
         self._require_order()
 
     def _sample(self, at: Any) -> Mapping[str, SX]:
+        """Return the output "sample", integral part "x" and error "error" at a sampling instant."""
         error = at.target - at.measured
         more = at.x + at.ki * error * at.period
         given = at.kp * error + at.kd * (error - at.error) / at.period
@@ -480,5 +555,9 @@ class SampledPID(SampledBlock):
         return {"sample": saturate(given + x, at.low, at.high, SX(0)), "x": x, "error": error}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"u": output computed at the last sampling instant, within the limits}."""
+        """Return {"u": output computed at the last sampling instant, within the limits}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"u": at.sample}

@@ -27,10 +27,10 @@ Rows = tuple[tuple[float, ...], ...]
 
 
 def _rows_of(name: str, what: str, given: Any, columns: int, least: int, example: str) -> Rows:
-    """Return a table of numbers as tuples; raise DescriptionError if it is invalid.
+    """Return a table of numbers as rows; raise DescriptionError if it is invalid.
 
-    The table needs `columns` numbers per row and `least` rows. `what` and `example` are for
-    messages.
+    The table `given` needs `columns` numbers per row and at least `least` rows. `name`, `what` and
+    `example` are for messages.
     """
     try:
         values: NDArray[np.float64] = np.array(given, dtype=float)
@@ -93,18 +93,28 @@ class PointOnCurve(Custom):
         """Return rows "x", "y", "z": position of the pin minus the curve point c(s) [m].
 
         Both are vectors in axes of `ground`.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         off = at.ground.to(at.pin).p - self.spline.at(at.s)
         return dict(zip("xyz", casadi.vertsplit(off), strict=True))
 
     def crossings(self, at: Any) -> Mapping[str, SX]:
-        """Return {"knots": event indicator}, which changes sign at each knot of the spline."""
+        """Return {"knots": event indicator}, which changes sign at each knot of the spline.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"knots": self.spline.bend(at.s)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """Return force_x, force_y, force_z: constraint force ON the pin, in axes of ground [N].
 
         The body of `ground` gets the reaction, which is not part of the outputs.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {f"force_{axis}": at.lam[axis] for axis in "xyz"}
 
@@ -179,18 +189,29 @@ class Cam(Custom):
             )
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return {"lift": driven minus lift(driver) [m or rad]}."""
+        """Return {"lift": driven minus lift(driver) [m or rad]}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         lift = self.spline.at(at.driver.q)
         return {"lift": Row(at.driven.q - lift, "m" if at.driven.unit == "m" else "1")}
 
     def crossings(self, at: Any) -> Mapping[str, SX]:
-        """Return {"knots": event indicator}, which changes sign at each knot of the lift."""
+        """Return {"knots": event indicator}, which changes sign at each knot of the lift.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"knots": self.spline.bend(at.driver.q)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
         """Return {"effort": constraint effort ON the driven coordinate [N or N m]}.
 
         It is negative if a follower that is only pressed on would leave the cam.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {"effort": at.lam["lift"]}
 

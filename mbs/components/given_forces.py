@@ -51,6 +51,9 @@ class ForceInput(_GivenOnPoint):
 
         The components are along the axes of the world or of the point, see `axes`. No other body
         gets a reaction.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         F = casadi.vertcat(at.x, at.y, at.z)
         return {"point": custom.force(F, own_axes=self.axes == "body")}
@@ -73,6 +76,9 @@ class TorqueInput(_GivenOnPoint):
         """Return {"point": torque (x, y, z) ON the body [N m]}, without a reaction on other bodies.
 
         The components are along the axes of the world or of the point, see `axes`.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         T = casadi.vertcat(at.x, at.y, at.z)
         return {"point": custom.torque(T, own_axes=self.axes == "body")}
@@ -98,6 +104,9 @@ class PairForceInput(Custom):
         """Return the wrenches by "a" and "b": force (x, y, z) ON b at its origin, reaction ON a.
 
         Each is in axes of its own frame, about its own origin [N, N m].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         F = casadi.vertcat(at.x, at.y, at.z)
         on_a = custom.FrameLoad(-F, -casadi.cross(at.a.to(at.b).p, F))
@@ -123,6 +132,9 @@ class PairTorqueInput(Custom):
         """Return the torques by "a" and "b": (x, y, z) ON b, the opposite ON a [N m].
 
         The inputs are along the axes of a. Each load is converted to axes of its own frame.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         T = casadi.vertcat(at.x, at.y, at.z)
         return custom.between(at.a, at.b, custom.FrameLoad(SX.zeros(3), -T), T)
@@ -144,14 +156,19 @@ class LineForceInput(Custom):
     speed = custom.output("m/s")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the forces ON the points "a" and "b".
+        """Return the forces ON the points "a" and "b": `tension` [N], towards the other point.
 
-        Each `tension` [N] towards the other point.
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return custom.pull(at.a, at.b, at.tension)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return "length": distance of the points [m], and "speed": its rate [m/s]."""
+        """Return "length": distance of the points [m], and "speed": its rate [m/s].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         motion = at.a.to(at.b)
         return {"length": motion.length, "speed": motion.rate}
 
@@ -170,7 +187,11 @@ class JointEffort(Custom):
     tau = custom.input(custom.EFFORT)
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return {"joint": effort ON the coordinate [N m or N]}, equal to the input `tau`."""
+        """Return {"joint": effort ON the coordinate [N m or N]}, equal to the input `tau`.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"joint": at.tau}
 
 
@@ -180,7 +201,11 @@ class ShaftTorqueInput(TwoFlanges):
     tau = custom.input("N.m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the torques ON the shafts [N m]: `tau` on "flange_b", -`tau` on "flange_a"."""
+        """Return the torques ON the shafts [N m]: `tau` on "flange_b", -`tau` on "flange_a".
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"flange_a": -at.tau, "flange_b": at.tau}
 
 
@@ -192,7 +217,11 @@ class SlidingForceInput(TwoFlanges):
     force = custom.input("N")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the forces ON the flanges [N]: `force` on "flange_b", -`force` on "flange_a"."""
+        """Return the forces ON the flanges [N]: `force` on "flange_b", -`force` on "flange_a".
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"flange_a": -at.force, "flange_b": at.force}
 
 
@@ -207,9 +236,17 @@ class ForceSource(Device):
     v = custom.output("m/s")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return {"flange": force ON the sliding part [N]}, equal to the input `force`."""
+        """Return {"flange": force ON the sliding part [N]}, equal to the input `force`.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"flange": at.force}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"v": velocity of the flange [m/s]}."""
+        """Return {"v": velocity of the flange [m/s]}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"v": at.flange.speed}

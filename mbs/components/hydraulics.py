@@ -70,7 +70,11 @@ class HydraulicCylinder(Custom):
     force = custom.output("N")
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rates of the gauge pressures p_a and p_b of the two chambers [Pa/s]."""
+        """Return the rates of the gauge pressures p_a and p_b of the two chambers [Pa/s].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         motion = at.a.to(at.b)
         s, rate = motion.length - at.closed, motion.rate
         past = at.leakage * (at.p_a - at.p_b)
@@ -81,18 +85,27 @@ class HydraulicCylinder(Custom):
         }
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the forces ON the points "a" and "b".
+        """Return the forces ON the points "a" and "b": `force` [N], away from the other point.
 
-        Each `force` [N] away from the other point.
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return custom.pull(at.a, at.b, -self._force(at))
 
     def energy(self, at: Any) -> SX:
-        """Return the energy of the end stops [J], zero between them; the oil is not included."""
+        """Return the energy of the end stops [J], zero between them; the oil is not included.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(at.end_stiffness * sum((area for _, _, _, area in self._ends(at)), SX(0)))
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"force": total force of the class docstring [N]}, positive if it pushes."""
+        """Return {"force": total force of the class docstring [N]}, positive if it pushes.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"force": self._force(at)}
 
     def _force(self, at: Any) -> SX:
@@ -106,10 +119,10 @@ class HydraulicCylinder(Custom):
 
     @staticmethod
     def _ends(at: Any) -> list[tuple[float, SX, SX, SX]]:
-        """Return sign, ramp slope, ramp [m] and its integral [m^2] of the stops at 0 and at stroke.
+        """Return (sign, ramp slope, ramp [m], integral of the ramp [m^2]) of the two end stops.
 
-        The sign is 1 if the stop pushes the points apart. The rest is zero while it is not in
-        contact.
+        The sign is 1 at s = 0, where the stop pushes the points apart, and -1 at s = stroke. The
+        other values are zero without contact, see `smooth_ramp`.
         """
         s = at.a.to(at.b).length - at.closed
         sides = ((1.0, -s), (-1.0, s - at.stroke))
@@ -147,7 +160,11 @@ class HydraulicValve(Custom):
     flow_b = custom.output("m3/s")
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return flow_a and flow_b: flows from the valve INTO chambers a and b [m^3/s]."""
+        """Return flow_a and flow_b: flows from the valve INTO chambers a and b [m^3/s].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         s = casadi.fmin(casadi.fmax(at.spool, -1), 1)
         ahead, back = casadi.fmax(s, 0), casadi.fmax(-s, 0)
         fill_a, drain_a = self._flow(at, at.supply - at.p_a), self._flow(at, at.p_a - at.tank)
@@ -159,6 +176,9 @@ class HydraulicValve(Custom):
 
     @staticmethod
     def _flow(at: Any, drop: SX) -> SX:
-        """Return the flow through a fully open edge [m^3/s]; its sign is that of `drop` [Pa]."""
+        """Return the flow through a fully open edge at the pressure difference `drop` [Pa] [m^3/s].
+
+        It has the sign of `drop`.
+        """
         root = drop / (drop**2 + at.transition**2) ** 0.25
         return SX(at.rated_flow * root / casadi.sqrt(at.rated_drop))

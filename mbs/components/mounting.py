@@ -45,7 +45,13 @@ _REVOLUTION = 2 * math.pi
 
 
 def notes_on_degrees(steps: Iterable[Step]) -> list[ImportNote]:
-    """Return a note "doubted" for each rotation by more than one revolution: probably degrees."""
+    """Return a note "doubted" for each rotation by more than one revolution.
+
+    Its angle is probably in degrees.
+
+    Args:
+        steps: displacement steps of a mount.
+    """
     angles = [
         (step.axis, to_float(step.angle)) for step in steps if isinstance(step, ElementaryRotation)
     ]

@@ -67,13 +67,20 @@ class RopeOverPulleys(_Rope):
     """
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return {"length": length of the path minus length of the rope [m]}."""
+        """Return {"length": length of the path minus length of the rope [m]}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"length": self._length(at) - at.length}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"tension": constraint force along the rope [N]}.
+        """Return {"tension": constraint force along the rope [N]}, positive if it pulls.
 
-        Positive values pull the points together. It is negative where a real rope would be slack.
+        It is negative where a real rope would be slack.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {"tension": -at.lam["length"]}
 
@@ -106,6 +113,9 @@ class ElasticRope(_Rope):
         """Return the force ON each point by "p0", "p1", ...: the tension towards each neighbour.
 
         A force is in axes of its own point [N]. All forces are zero while the rope is slack.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         T = self._tension(at)
         total: dict[str, FrameLoad] = {}
@@ -117,19 +127,31 @@ class ElasticRope(_Rope):
         return total
 
     def energy(self, at: Any) -> SX:
-        """Return the energy of the stretched rope [J]; zero while the rope is slack."""
+        """Return the energy of the stretched rope [J]; zero while the rope is slack.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(at.stiffness * self._stretch(at)[2])
 
     def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by the damper [W]; zero while the rope is slack."""
+        """Return the power dissipated by the damper [W]; zero while the rope is slack.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(self._tensions(at)[1] * self._rate(at))
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"tension": tension [N]}, never negative and zero while the rope is slack."""
+        """Return {"tension": tension [N]}, never negative and zero while the rope is slack.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"tension": self._tension(at)}
 
     def _stretch(self, at: Any) -> tuple[SX, SX, SX]:
-        """Return slope, ramp [m] and integral of the ramp [m^2] at the stretch, see `smooth_ramp`.
+        """Return (slope, ramp [m], integral of the ramp [m^2]) of `smooth_ramp` at the stretch.
 
         All are zero while the rope is slack.
         """
@@ -144,9 +166,7 @@ class ElasticRope(_Rope):
         return sum(self._tensions(at), SX(0))
 
     def _tensions(self, at: Any) -> tuple[SX, SX]:
-        """Return the tensions of the spring and of the damper [N].
-
-        Both zero while the rope is slack.
+        """Return the tensions of the spring and of the damper [N]; zero while the rope is slack.
 
         The damper tension is negative while the rope shortens, and at most as large as the spring
         tension.

@@ -39,12 +39,20 @@ class _BetweenShafts(TwoFlanges):
     torque = custom.output("N.m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return {"flange_a": -T, "flange_b": T}: torques ON the shafts [N m]; `torque` is T."""
+        """Return {"flange_a": -T, "flange_b": T}: torques ON the shafts [N m]; `torque` is T.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         T = self._torque(at)
         return {"flange_a": -T, "flange_b": T}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"torque": torque that flange_b gets from flange_a [N m]}."""
+        """Return {"torque": torque that flange_b gets from flange_a [N m]}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"torque": self._torque(at)}
 
     def _torque(self, at: Any) -> SX:
@@ -60,7 +68,11 @@ class _SlippingShafts(_BetweenShafts):
     """Base of elements that dissipate all the power of their torque."""
 
     def dissipation(self, at: Any) -> SX:
-        """Return the torque from a to b times the slip speed w_a - w_b [W]."""
+        """Return the torque from a to b times the slip speed w_a - w_b [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(self._torque(at) * self._slip(at))
 
 
@@ -70,15 +82,27 @@ class _BrakingTorque(OneFlange):
     torque = custom.output("N.m")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return {"flange": -T}: torque ON the shaft [N m], opposed to its speed."""
+        """Return {"flange": -T}: torque ON the shaft [N m], opposed to its speed.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"flange": -self._torque(at)}
 
     def dissipation(self, at: Any) -> SX:
-        """Return the braking torque times the speed of the shaft [W]."""
+        """Return the braking torque times the speed of the shaft [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(self._torque(at) * at.flange.speed)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"torque": T [N m]}, with the sign of the speed. The shaft gets -T."""
+        """Return {"torque": T [N m]}, with the sign of the speed. The shaft gets -T.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"torque": self._torque(at)}
 
     def _torque(self, at: Any) -> SX:
@@ -110,15 +134,27 @@ class ShaftSpringDamperSeries(_BetweenShafts):
     parallel = custom.parameter("N.m/rad", 0.0, min=0)
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"twist": dz/dt [rad/s]}, the damper torque divided by `damping`."""
+        """Return {"twist": dz/dt [rad/s]}, the damper torque divided by `damping`.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"twist": self._damper_torque(at) / at.damping}
 
     def energy(self, at: Any) -> SX:
-        """Return the energy of both springs, stiffness (x - z)^2 / 2 + parallel z^2 / 2 [J]."""
+        """Return the energy of both springs, stiffness (x - z)^2 / 2 + parallel z^2 / 2 [J].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(0.5 * (at.stiffness * self._stretch(at) ** 2 + at.parallel * at.twist**2))
 
     def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by the damper, damper torque^2 / damping [W]."""
+        """Return the power dissipated by the damper, damper torque^2 / damping [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(self._damper_torque(at) ** 2 / at.damping)
 
     def _damper_torque(self, at: Any) -> SX:
@@ -130,6 +166,7 @@ class ShaftSpringDamperSeries(_BetweenShafts):
         return SX(at.flange_a.angle - at.flange_b.angle - at.twist)
 
     def _torque(self, at: Any) -> SX:
+        """Return the torque T = stiffness (x - z) from a to b [N m]."""
         return SX(at.stiffness * self._stretch(at))
 
 
@@ -157,16 +194,25 @@ class ElastoBacklash(_BetweenShafts):
     width = custom.parameter("rad", _FLANK, positive=True)
 
     def energy(self, at: Any) -> SX:
-        """Return the energy of the flanks in contact [J]; zero within the backlash."""
+        """Return the energy of the flanks in contact [J]; zero within the backlash.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(
             at.stiffness * sum((smooth_ramp(d, at.width)[2] for _, d in self._sides(at)), SX(0))
         )
 
     def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by the damper [W]; zero within the backlash."""
+        """Return the power dissipated by the damper [W]; zero within the backlash.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(self._torques(at)[1] * self._slip(at))
 
     def _torque(self, at: Any) -> SX:
+        """Return the torque of spring and damper from a to b [N m]."""
         return sum(self._torques(at), SX(0))
 
     def _torques(self, at: Any) -> tuple[SX, SX]:
@@ -213,14 +259,21 @@ class PlanetaryGear(custom.Custom):
     torque_carrier = custom.output("N.m")
 
     def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return {"mesh": angle_sun + ratio angle_ring - (1 + ratio) angle_carrier [rad]}."""
+        """Return {"mesh": angle_sun + ratio angle_ring - (1 + ratio) angle_carrier [rad]}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         value = at.sun.angle + at.ratio * at.ring.angle - (1 + at.ratio) * at.carrier.angle
         return {"mesh": Row(value, "1")}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the constraint torques ON the shafts [N m].
+        """Return the constraint torques ON the three shafts [N m].
 
-        Names: torque_sun, torque_ring, torque_carrier.
+        They are named torque_sun, torque_ring and torque_carrier.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         T = at.lam["mesh"]
         return {
@@ -274,20 +327,36 @@ class LossyGear(TwoFlanges):
             )
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the torques ON the shafts [N m]: "flange_b": T, "flange_a": -T (1 + e) / ratio."""
+        """Return the torques ON the shafts [N m]: "flange_b": T, "flange_a": -T (1 + e) / ratio.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         T = self._torque(at)
         return {"flange_a": -T * (1 + self._losses(at)) / at.ratio, "flange_b": T}
 
     def energy(self, at: Any) -> SX:
-        """Return stiffness x^2 / 2 of the twist x at flange_b [J]."""
+        """Return stiffness x^2 / 2 of the twist x at flange_b [J].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(0.5 * at.stiffness * self._twist(at) ** 2)
 
     def dissipation(self, at: Any) -> SX:
-        """Return the power lost in the damper and in the mesh [W]."""
+        """Return the power lost in the damper and in the mesh [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(at.damping * self._rate(at) ** 2 + self._loss(at))
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return "torque": T ON flange_b [N m], and "loss": power lost in the mesh only [W]."""
+        """Return "torque": T ON flange_b [N m], and "loss": power lost in the mesh only [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"torque": self._torque(at), "loss": self._loss(at)}
 
     def _twist(self, at: Any) -> SX:
@@ -330,6 +399,7 @@ class QuadraticSpeedTorque(_BrakingTorque):
     coefficient = custom.parameter("N.m.s2/rad2", min=0)
 
     def _torque(self, at: Any) -> SX:
+        """Return coefficient abs(w) w [N m] at the shaft speed w."""
         w = at.flange.speed
         return SX(at.coefficient * casadi.fabs(w) * w)
 
@@ -353,6 +423,7 @@ class Brake(_BrakingTorque):
     engagement = custom.input()
 
     def _torque(self, at: Any) -> SX:
+        """Return the smooth friction torque of the brake [N m], with the sign of the speed."""
         return friction_of(at, at.flange.speed)
 
 
@@ -375,13 +446,20 @@ class Clutch(_SlippingShafts):
     engagement = custom.input()
 
     def _torque(self, at: Any) -> SX:
+        """Return the smooth friction torque from a to b [N m], with the sign of the slip speed."""
         return friction_of(at, self._slip(at))
 
 
 def friction_of(at: Any, w: SX) -> SX:
-    """Return the smooth Coulomb friction [N m or N] of a brake or clutch, with the sign of w.
+    """Return the smooth Coulomb friction of a brake or clutch [N m or N].
 
-    `w` is the slip speed [rad/s or m/s]. The size is capacity max(engagement, 0) tanh(|w| / width).
+    Its sign is that of the slip velocity w.
+
+    Its size is capacity max(engagement, 0) tanh(abs(w) / width).
+
+    Args:
+        at: values of capacity, engagement and width of the component.
+        w: (1, 1) slip velocity [rad/s or m/s].
     """
     return SX(at.capacity * casadi.fmax(at.engagement, 0) * smooth_sign(w, at.width))
 
@@ -404,6 +482,7 @@ class OneWayClutch(_SlippingShafts):
     width = custom.parameter("rad/s", _CREEP, positive=True)
 
     def _torque(self, at: Any) -> SX:
+        """Return the torque from a to b [N m], zero while b is faster."""
         return SX(at.damping * smooth_ramp(self._slip(at), at.width)[1])
 
 
@@ -432,6 +511,9 @@ class RigidBrake(OneFlange):
         """Return {"": Friction} whose slip is the speed of the shaft [rad/s].
 
         Its limit is capacity times max(engagement, 0).
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {"": capacity_of(at, at.flange.speed)}
 
@@ -459,6 +541,9 @@ class RigidClutch(TwoFlanges):
         """Return {"": Friction} whose slip is the speed of flange_b minus that of flange_a [rad/s].
 
         Its effort is the torque ON flange_b [N m].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {"": capacity_of(at, at.flange_b.speed - at.flange_a.speed)}
 
@@ -467,7 +552,11 @@ def capacity_of(at: Any, slip: SX) -> Friction:
     """Return the Coulomb friction with sticking of a brake or clutch.
 
     The sliding limit is capacity times max(engagement, 0), the sticking limit `sticking` times
-    that. `slip` is the slip velocity [rad/s or m/s].
+    that.
+
+    Args:
+        at: values of capacity, engagement and sticking of the component.
+        slip: (1, 1) slip velocity [rad/s or m/s].
     """
     sliding = at.capacity * casadi.fmax(at.engagement, 0)
     return Friction(slip, sliding, at.sticking * sliding)
@@ -483,5 +572,9 @@ class RigidOneWayClutch(TwoFlanges):
     """
 
     def stops(self, at: Any) -> Mapping[str, Stop | OneWay]:
-        """Return {"": OneWay}: the speed of flange_b minus that of flange_a stays at least zero."""
+        """Return {"": OneWay}: the speed of flange_b minus that of flange_a stays at least zero.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"": OneWay(at.flange_b.speed - at.flange_a.speed)}

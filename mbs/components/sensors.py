@@ -67,14 +67,14 @@ class Sensor(OnPoints):
 
     @property
     def measured(self) -> tuple[Quantity, ...]:
-        """Measured quantities in the order of the readings.
+        """Measured quantities, in the order of the readings.
 
-        Empty for a joint sensor: the assembly determines its quantities from the coordinate.
+        Empty for a joint sensor, whose quantities depend on the type of the coordinate.
         """
         raise NotImplementedError
 
     def _check_axes(self, allowed: tuple[str, ...], meaning: str) -> None:
-        """Raise DescriptionError, with the advice `meaning`, if `axes` is not allowed."""
+        """Raise DescriptionError if the field `axes` is not allowed; `meaning` is the advice."""
         axes = getattr(self, "axes", None)
         if axes not in allowed:
             raise DescriptionError(f"{self.name}: axes is {quoted(axes)}; use {meaning}")
@@ -91,7 +91,10 @@ class MotionSensor(Sensor):
         return tuple(quantity for quantity in _MOTION if quantity.name in names)
 
     def _check_quantities(self) -> None:
-        """Replace None by all quantities; raise DescriptionError for unknown names."""
+        """Replace the field `quantities` by a tuple of names, in place; None becomes all names.
+
+        Raise DescriptionError for unknown names.
+        """
         given = getattr(self, "quantities", None)
         known = [quantity.name for quantity in _MOTION]
         if given is None:
@@ -138,7 +141,7 @@ class AbsoluteSensor(MotionSensor):
 
     @property
     def points(self) -> tuple[Point, ...]:
-        """Tuple with the measured point only."""
+        """The measured point, as a tuple."""
         return (self.point,)
 
 
@@ -206,7 +209,11 @@ class OnJoint(Sensor):
             )
 
     def scoped(self: S, prefix: str) -> S:
-        """Return a copy whose name and joint have the prefix "`prefix`."."""
+        """Return a copy whose name and joint have the prefix "`prefix`.".
+
+        Args:
+            prefix: text before the names, without the dot.
+        """
         return replace(Component.scoped(self, prefix), joint=f"{prefix}.{self.joint}")
 
 

@@ -43,12 +43,16 @@ class SignalSource(SignalBlock):
     y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"clock": 1}: one second per second."""
+        """Return {"clock": 1}: one second per second.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"clock": SX(1)}
 
 
 def _held(begun: SX, signal: SX) -> SX:
-    """Return `signal` if `begun`, the time since its start, is at least zero; else zero."""
+    """Return `signal` if `begun`, the time since its start [s], is at least zero; else zero."""
     return casadi.if_else(begun >= 0, signal, 0)
 
 
@@ -69,11 +73,19 @@ class Step(SignalSource):
     offset = custom.parameter("1", 0.0)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": offset, plus height from start_time on}."""
+        """Return {"y": offset, plus height from start_time on}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"y": at.offset + _held(at.clock - at.start_time, at.height)}
 
     def crossings(self, at: Any) -> Mapping[str, SX]:
-        """Return {"start": time since start_time [s]}, the event indicator of the step."""
+        """Return {"start": time since start_time [s]}, the event indicator of the step.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"start": at.clock - at.start_time}
 
 
@@ -93,12 +105,20 @@ class Ramp(SignalSource):
     offset = custom.parameter("1", 0.0)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": ramp of the class docstring}, constant before and after the rise."""
+        """Return {"y": ramp of the class docstring}, constant before and after the rise.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         part = (at.clock - at.start_time) / at.duration
         return {"y": at.offset + at.height * casadi.fmin(casadi.fmax(part, 0), 1)}
 
     def crossings(self, at: Any) -> Mapping[str, SX]:
-        """Return the times since the start ("start") and the end ("end") of the rise [s]."""
+        """Return the times since the start ("start") and the end ("end") of the rise [s].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         begun = at.clock - at.start_time
         return {"start": begun, "end": begun - at.duration}
 
@@ -123,16 +143,27 @@ class Sine(SignalSource):
     offset = custom.parameter("1", 0.0)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": value of the class equation; offset before start_time}."""
+        """Return {"y": value of the class equation; offset before start_time}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         begun = at.clock - at.start_time
         return {"y": at.offset + _held(begun, self._wave(at, begun))}
 
     def _wave(self, at: Any, begun: SX) -> SX:
-        """Return the deviation of y from the offset at the time `begun` since start_time [s]."""
+        """Return the deviation of y from the offset.
+
+        `begun` is the time since start_time [s].
+        """
         return SX(at.amplitude * casadi.sin(2 * math.pi * at.frequency * begun + at.phase))
 
     def crossings(self, at: Any) -> Mapping[str, SX]:
-        """Return {"start": time since start_time [s]}."""
+        """Return {"start": time since start_time [s]}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"start": at.clock - at.start_time}
 
 
@@ -147,6 +178,10 @@ class ExpSine(Sine):
     damping = custom.parameter("1/s", 1.0)
 
     def _wave(self, at: Any, begun: SX) -> SX:
+        """Return the damped deviation of y from the offset.
+
+        `begun` is the time since start_time [s].
+        """
         # fmax keeps exp from overflowing before the begin, where the value is not used
         return SX(Sine._wave(self, at, begun) * casadi.exp(-at.damping * casadi.fmax(begun, 0)))
 
@@ -201,6 +236,9 @@ class KinematicPTP(SignalSource):
         """Return position "y", its rate "v" and the rate "a" of v.
 
         Before the motion y is `begin`, after it `end`; v and a are then zero.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         rise, brake, last = _ptp_times(at.begin, at.end, at.v_max, at.a_max)
         slower, distance = self._slower(at, last), casadi.fabs(at.end - at.begin)
@@ -226,6 +264,9 @@ class KinematicPTP(SignalSource):
         """Return the times since "start", "rise", "brake" and "end" [s], where a jumps.
 
         "rise" is the end of the acceleration, "brake" the begin of the braking.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         times = _ptp_times(at.begin, at.end, at.v_max, at.a_max)
         slower, begun = self._slower(at, times[-1]), at.clock - at.start_time
@@ -235,7 +276,11 @@ class KinematicPTP(SignalSource):
         return {"start": begun, **after}
 
     def _slower(self, at: Any, shortest: SX) -> SX:
-        """Return `duration` divided by the shortest duration; 1 without duration or distance."""
+        """Return the factor by which the given duration slows down the fastest motion.
+
+        It is `duration` divided by `shortest`, the shortest duration [s]; 1 without duration or
+        distance.
+        """
         if at.duration is None:
             return SX(1)
         return casadi.if_else(
@@ -244,9 +289,10 @@ class KinematicPTP(SignalSource):
 
 
 def _ptp_times(begin: SX, end: SX, v_max: SX, a_max: SX) -> tuple[SX, SX, SX]:
-    """Return the end of the acceleration, begin of the braking and end of the motion [s].
+    """Return the ends of acceleration and of constant speed, and the end of the motion [s].
 
-    All are times since the start of the fastest motion.
+    They are times since the start of the fastest motion from `begin` to `end`, with the limits
+    `v_max` and `a_max`.
     """
     distance = casadi.fabs(end - begin)
     rise = casadi.fmin(v_max / a_max, casadi.sqrt(distance / a_max))
@@ -278,7 +324,10 @@ class PeriodicSource(SignalSource):
         raise NotImplementedError
 
     def _level(self, at: Any, since: SX) -> list[SX]:
-        """Return the height in each phase by the amplitude, `since` seconds after its start."""
+        """Return the height in each phase, divided by the amplitude.
+
+        `since` is the time since the start of the phase [s].
+        """
         raise NotImplementedError
 
     def _require_count(self) -> None:
@@ -293,6 +342,9 @@ class PeriodicSource(SignalSource):
         """Return {"y": offset, plus amplitude times the height of the present phase}.
 
         It is the offset before start_time and after the last period.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         level = self._level(at, at.clock - at.entered)
         height = sum((casadi.if_else(at.phase == k, h, 0) for k, h in enumerate(level)), SX(0))
@@ -301,12 +353,19 @@ class PeriodicSource(SignalSource):
         }
 
     def _runs(self, at: Any, number: SX) -> SX:
-        """Return whether the period of index `number` exists: 0 <= number < count."""
+        """Return whether the period of index `number` exists: 0 <= number < count.
+
+        Without a count there is no upper limit.
+        """
         begun = number >= 0
         return begun if at.count is None else casadi.logic_and(begun, number < at.count)
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"clock": 1, "left": -1}; the rate of `left` is zero after the last period."""
+        """Return {"clock": 1, "left": -1}; the rate of `left` is zero after the last period.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         over = SX(0) if at.count is None else at.number >= at.count
         return {**SignalSource.rates(self, at), "left": casadi.if_else(over, 0, -1)}
 
@@ -314,6 +373,9 @@ class PeriodicSource(SignalSource):
         """Return the event "switches" at left = 0, which sets phase, number, left and entered.
 
         It starts the next phase. The first event, at the first time, finds the phase of that time.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         durations = self._durations(at)
         period = sum(durations, SX(0))
@@ -380,9 +442,11 @@ class Pulse(PeriodicSource):
         self._require_count()
 
     def _durations(self, at: Any) -> list[SX]:
+        """Return the durations of the pulse and of the rest of a period [s]."""
         return [SX(at.duty * at.period), SX((1 - at.duty) * at.period)]
 
     def _level(self, at: Any, since: SX) -> list[SX]:
+        """Return the heights of a pulse (1) and of the rest of a period (0)."""
         return [SX(1), SX(0)]
 
 
@@ -422,10 +486,15 @@ class Trapezoid(PeriodicSource):
             )
 
     def _durations(self, at: Any) -> list[SX]:
+        """Return the durations of rise, full height, fall and rest of a period [s]."""
         rest = casadi.fmax(at.period - at.rising - at.width - at.falling, 0)
         return [at.rising, at.width, at.falling, rest]
 
     def _level(self, at: Any, since: SX) -> list[SX]:
+        """Return the heights in rise, full height, fall and rest, from 0 to 1.
+
+        `since` is the time since the start of the phase [s].
+        """
         rise, fall = (since / casadi.if_else(t > 0, t, 1) for t in (at.rising, at.falling))
         return [rise, SX(1), 1 - fall, SX(0)]
 
@@ -536,7 +605,7 @@ class Table(SignalSource):
         smoothness: str = "linear",
         extrapolation: str = "hold",
     ) -> Table:
-        """Table of two columns of a file of comma-separated values.
+        """Return the table of two columns of a file of comma-separated values.
 
         Commas, semicolons and tabs separate columns. A first line without numbers has the names of
         the columns. Empty lines and lines that begin with # are skipped.
@@ -573,7 +642,9 @@ class Table(SignalSource):
         return table
 
     def _intervals(self) -> tuple[Array, Array]:
-        """Return starts (n + 1,) [s] of intervals and their polynomials (n + 1, 4), c0 first.
+        """Return the starts [s] of all intervals, and their cubic polynomials with c0 first.
+
+        They are (n + 1,) and (n + 1, 4) for n points.
 
         The first interval is before the table, and its polynomial starts at the first time. The
         last interval is after the table. The n - 1 others are between successive points.
@@ -598,12 +669,20 @@ class Table(SignalSource):
         return np.concatenate([begins[:1], begins, t[-1:]]), every
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"clock": 1, "left": -1}; the rate of `left` is zero after the table."""
+        """Return {"clock": 1, "left": -1}; the rate of `left` is zero after the table.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         last = len(self._intervals()[0]) - 1
         return {**SignalSource.rates(self, at), "left": casadi.if_else(at.row == last, 0, -1)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": polynomial of the present interval at the clock}."""
+        """Return {"y": polynomial of the present interval at the clock}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         s = at.clock - at.knot
         return {"y": at.c0 + s * (at.c1 + s * (at.c2 + s * at.c3))}
 
@@ -612,6 +691,9 @@ class Table(SignalSource):
 
         It starts the next interval. The first event, at the first time, finds the interval of that
         time.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         begins, polynomials = self._intervals()
         last, span = len(begins) - 1, begins[-1] - begins[0]
@@ -637,14 +719,18 @@ class Table(SignalSource):
 
 
 def _rows_at(table: Array, row: SX) -> list[SX]:
-    """Return the elements of row `row`, an expression, of a numeric table."""
+    """Return the elements of a row of a numeric table; `row`, its index, is an expression."""
     picked = casadi.vertcat(*(row == k for k in range(len(table))))
     found = casadi.mtimes(picked.T, DM(table))
     return [found[k] for k in range(table.shape[1])]
 
 
 def _cubics(name: str, smoothness: str, t: Array, y: Array) -> Array:
-    """Return (n, 4) coefficients of the cubic between successive points, c0 first."""
+    """Return the coefficients (n - 1, 4) of the cubics between n points (t, y), c0 first.
+
+    `smoothness` is "akima" or "monotone". Raise DescriptionError, with the component `name`, if
+    scipy is missing.
+    """
     try:
         from scipy.interpolate import Akima1DInterpolator, PchipInterpolator
     except ImportError:
@@ -658,7 +744,10 @@ def _cubics(name: str, smoothness: str, t: Array, y: Array) -> Array:
 
 
 def _csv_rows(name: str, path: Path) -> list[tuple[int, list[str]]]:
-    """Return (line number from 1, cells) of each line that is neither empty nor a comment."""
+    """Return (line number from 1, cells) of each line of a file, without empty lines and comments.
+
+    Raise DescriptionError, with the component `name`, if it cannot be read or has no rows.
+    """
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -673,7 +762,11 @@ def _csv_rows(name: str, path: Path) -> list[tuple[int, list[str]]]:
 
 
 def _csv_column(name: str, path: str | Path, given: str | int, names: list[str], count: int) -> int:
-    """Return the index of the column `given`, a name or an index; raise if it does not exist."""
+    """Return the index of a column; raise DescriptionError if it does not exist.
+
+    `given` is its name in `names` or its index below `count`; `name` is the component in the
+    message.
+    """
     if isinstance(given, str):
         if given in names:
             return names.index(given)
@@ -687,7 +780,7 @@ def _csv_column(name: str, path: str | Path, given: str | int, names: list[str],
 
 
 def _is_number(cell: str) -> bool:
-    """Return whether a cell is a finite number."""
+    """Return whether the text of a cell is a finite number."""
     try:
         return math.isfinite(float(cell))
     except ValueError:
@@ -721,15 +814,23 @@ class ReferenceFilter(SignalBlock):
     a = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"x": w, "w": acceleration [1/s2]}."""
+        """Return {"x": w, "w": acceleration [1/s2]}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"x": at.w, "w": self._acceleration(at)}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the filtered position "q", its rate "v" and the rate "a" of v."""
+        """Return the filtered position "q", its rate "v" and the rate "a" of v.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"q": at.x, "v": at.w, "a": self._acceleration(at)}
 
     def _acceleration(self, at: Any) -> SX:
-        """Return the rate of w that the filter sets for the input u [1/s2]."""
+        """Return the acceleration of the filtered position for the input u [1/s2]."""
         w = 2 * math.pi * at.frequency
         # Bessel filter of order 2: 1 / (1 + 1.3617 s/w + 0.6180 (s/w)^2), -3 dB at w
         return SX((w * (at.u - at.x) - 1.3617 * at.w) * w / 0.6180)

@@ -35,7 +35,11 @@ class Spline:
     period: float | None
 
     def at(self, t: SX) -> SX:
-        """Return the point (d, 1) of the curve at the parameter t, (1, 1)."""
+        """Return the point (d, 1) of the curve.
+
+        Args:
+            t: (1, 1) parameter of the curve.
+        """
         t, _ = self._within(t)
         steps = [t >= knot for knot in self.knots[1:]]
         u = t - _chosen(self.knots, steps)
@@ -43,10 +47,15 @@ class Spline:
         return casadi.vertcat(*(self._element(k, u, steps) for k in range(dimension)))
 
     def bend(self, t: SX) -> SX:
-        """Return an event indicator that is zero at the knots, where the third derivative jumps.
+        """Return an event indicator (1, 1) that is zero at the knots.
+
+        The third derivative of the curve is discontinuous there.
 
         It is a parabola between two knots, alternately positive and negative, with slopes of 1 or
         -1 at the knots.
+
+        Args:
+            t: (1, 1) parameter of the curve.
         """
         t, turns = self._within(t)
         knots = np.unique(self.knots)
@@ -60,14 +69,20 @@ class Spline:
         return SX(sign * (t - before) * (after - t) / (after - before))
 
     def _within(self, t: SX) -> tuple[SX, SX]:
-        """Return t reduced to the first period, and the number of removed periods (or 0)."""
+        """Return t reduced to the first period, and the number of removed periods.
+
+        Without a period they are t and 0.
+        """
         if self.period is None:
             return t, SX(0)
         turns = casadi.floor((t - self.knots[0]) / self.period)
         return SX(t - self.period * turns), SX(turns)
 
     def _element(self, k: int, u: SX, steps: Sequence[SX]) -> SX:
-        """Return element k of the active piece at the distance u from its knot."""
+        """Return element k of the active piece at the distance u from its knot.
+
+        `steps` is whether t is at or above each knot but the first.
+        """
         value = SX(0)
         for power in (3, 2, 1, 0):
             value = value * u + _chosen(self.coefficients[power, :, k], steps)
@@ -75,7 +90,11 @@ class Spline:
 
 
 def _chosen(values: Array, steps: Sequence[SX]) -> SX:
-    """Return the entry of `values` whose index is the number of true `steps`: the active piece."""
+    """Return the entry of `values` whose index is the number of true `steps`.
+
+    The steps, expressions of 0 or 1, count the knots that are passed: the entry of the active
+    piece.
+    """
     found = SX(float(values[0]))
     for step, jump in zip(steps, np.diff(values), strict=True):
         found += step * float(jump)
@@ -83,9 +102,13 @@ def _chosen(values: Array, steps: Sequence[SX]) -> SX:
 
 
 def natural_spline(t: Array, points: Array) -> Spline:
-    """Return the spline through points (n, d) at t (n,), straight beyond its ends.
+    """Return the spline through points, straight beyond its ends.
 
     Its second derivatives are zero at both ends.
+
+    Args:
+        t: (n,) increasing parameters of the points.
+        points: (n, d) points.
     """
     h: Array = np.diff(t)
     slopes: Array = np.diff(points, axis=0) / h[:, None]
@@ -107,7 +130,13 @@ def natural_spline(t: Array, points: Array) -> Spline:
 
 
 def periodic_spline(t: Array, points: Array, period: float) -> Spline:
-    """Return the spline of period `period` through points (n, d) at t (n,), within one period."""
+    """Return the periodic spline through points.
+
+    Args:
+        t: (n,) increasing parameters of the points, within one period.
+        points: (n, d) points.
+        period: period of the parameter.
+    """
     n = len(t)
     h: Array = np.diff(np.append(t, t[0] + period))
     slopes = np.diff(np.concatenate([points, points[:1]]), axis=0) / h[:, None]
@@ -124,9 +153,10 @@ def periodic_spline(t: Array, points: Array, period: float) -> Spline:
 
 
 def _pieces(points: Array, slopes: Array, h: Array, M: Array) -> Array:
-    """Return (4, m, d) coefficients of the powers 0 .. 3 of each piece.
+    """Return the coefficients (4, m, d) of the powers 0 .. 3 of each piece.
 
-    `slopes` (m, d) of chords, lengths `h` (m,) of pieces, second derivatives `M` at knots.
+    `points` (m or m + 1, d) are the points, `slopes` (m, d) those of the chords, `h` (m,) the
+    lengths of the pieces in the parameter, and `M` (m + 1, d) the second derivatives at the knots.
     """
     h = h[:, None]
     first = slopes - h * (2 * M[:-1] + M[1:]) / 6

@@ -45,19 +45,30 @@ class SlidingMass(RigidPart):
 
 
 class _BetweenSlides(TwoFlanges):
-    """Base of elements that pull two flanges together, functions of x = position_b - position_a."""
+    """Base of elements that pull two flanges together.
+
+    Their tension is a function of x = position_b - position_a and its rate.
+    """
 
     flange_a = custom.flange(slides=True)
     flange_b = custom.flange(slides=True)
     force = custom.output("N")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the forces ON the flanges [N]: "flange_a": tension, "flange_b": -tension."""
+        """Return the forces ON the flanges [N]: "flange_a": tension, "flange_b": -tension.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         F = self._tension(at)
         return {"flange_a": F, "flange_b": -F}
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"force": tension [N]}, negative if the flanges are pushed apart."""
+        """Return {"force": tension [N]}, negative if the flanges are pushed apart.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"force": self._tension(at)}
 
     def _tension(self, at: Any) -> SX:
@@ -93,14 +104,23 @@ class SlidingSpring(_BetweenSlides):
         self._require_effect("stiffness", "damping")
 
     def energy(self, at: Any) -> SX:
-        """Return stiffness (x - length)^2 / 2 [J]."""
+        """Return stiffness (x - length)^2 / 2 [J].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(0.5 * at.stiffness * (self._extent(at) - at.length) ** 2)
 
     def dissipation(self, at: Any) -> SX:
-        """Return damping (dx/dt)^2 [W]."""
+        """Return damping (dx/dt)^2 [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(at.damping * self._rate(at) ** 2)
 
     def _tension(self, at: Any) -> SX:
+        """Return stiffness (x - length) + damping dx/dt [N]; negative if it pushes."""
         stretch = self._extent(at) - at.length
         return SX(at.stiffness * stretch + at.damping * self._rate(at))
 
@@ -115,10 +135,15 @@ class SlidingDamper(_BetweenSlides):
     damping = custom.parameter("N.s/m", min=0)
 
     def dissipation(self, at: Any) -> SX:
-        """Return damping (dx/dt)^2 [W]."""
+        """Return damping (dx/dt)^2 [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(at.damping * self._rate(at) ** 2)
 
     def _tension(self, at: Any) -> SX:
+        """Return damping dx/dt [N]; positive if the flanges move apart."""
         return SX(at.damping * self._rate(at))
 
 
@@ -146,14 +171,23 @@ class ElastoGap(_BetweenSlides):
     width = custom.parameter("m", _TOUCH, positive=True)
 
     def energy(self, at: Any) -> SX:
-        """Return the energy of the contact spring [J]; zero without contact."""
+        """Return the energy of the contact spring [J]; zero without contact.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(at.stiffness * self._contact(at)[2])
 
     def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by the damper [W]; zero without contact."""
+        """Return the power dissipated by the damper [W]; zero without contact.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(self._tensions(at)[1] * self._rate(at))
 
     def _tension(self, at: Any) -> SX:
+        """Return the tension of spring and damper [N], never positive."""
         return sum(self._tensions(at), SX(0))
 
     def _tensions(self, at: Any) -> tuple[SX, SX]:
@@ -166,7 +200,7 @@ class ElastoGap(_BetweenSlides):
         return -spring, one_sided_damping(at.damping * slope * self._rate(at), spring)
 
     def _contact(self, at: Any) -> tuple[SX, SX, SX]:
-        """Return slope, ramp [m] and integral of the ramp [m^2] at the depth, see `smooth_ramp`.
+        """Return (slope, ramp [m], integral of the ramp [m^2]) of `smooth_ramp` at the depth.
 
         All are zero without contact.
         """
@@ -194,15 +228,27 @@ class SlidingBrake(OneFlange):
     force = custom.output("N")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return {"flange": -F}: force ON the part [N], opposed to its speed."""
+        """Return {"flange": -F}: force ON the part [N], opposed to its speed.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"flange": -self._force(at)}
 
     def dissipation(self, at: Any) -> SX:
-        """Return the braking force times the speed of the part [W]."""
+        """Return the braking force times the speed of the part [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(self._force(at) * at.flange.speed)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"force": F [N]}, with the sign of the speed. The part gets -F."""
+        """Return {"force": F [N]}, with the sign of the speed. The part gets -F.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"force": self._force(at)}
 
     def _force(self, at: Any) -> SX:
@@ -229,5 +275,8 @@ class RigidSlidingBrake(OneFlange):
         """Return {"": Friction} whose slip is the speed of the part [m/s].
 
         Its limit is capacity times max(engagement, 0).
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {"": capacity_of(at, at.flange.speed)}

@@ -53,14 +53,18 @@ class WheelSet(Custom):
 
         "height" is the height of the axle centre above the plane less the radius. "level" is the
         cosine between the axle and the normal of the plane.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         motion = at.ground.to(at.axle)
         return {"height": motion.p[2] - at.radius, "level": Row(motion.R[2, 1], "1")}
 
     def positive(self, at: Any) -> Mapping[str, SX]:
-        """Return {"upright".
+        """Return {"upright": cosine of the z axes of `axle` and `ground`}, to be positive.
 
-        Cosine of the z axes of `axle` and `ground`}, which must be positive.
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {"upright": at.ground.to(at.axle).R[2, 2]}
 
@@ -69,6 +73,9 @@ class WheelSet(Custom):
 
         "left" and "right" are the velocities of the lowest point of each wheel in the direction of
         travel.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         motion = at.ground.to(at.axle)
         axle = motion.R[:, 1]
@@ -85,6 +92,9 @@ class WheelSet(Custom):
         """Return the forces of the ground ON the wheels [N].
 
         Names: force_left, force_right (in the direction of travel), force_lateral, force_normal.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {
             "force_left": at.lam["left"],

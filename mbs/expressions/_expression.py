@@ -25,7 +25,12 @@ _ROUNDING = 4e-16
 
 
 def apply_float(operator: str, values: list[float]) -> float:
-    """Return the value of an operator or function on numbers; NaN if it is undefined."""
+    """Return the value of an operator or function on numbers; NaN if it is undefined.
+
+    Args:
+        operator: "+", "-", "*", "/", "^", "negate", or a function in FUNCTIONS.
+        values: values of the one or two operands.
+    """
     try:
         with np.errstate(all="ignore"):
             result = arithmetic(operator, [np.float64(v) for v in values])
@@ -39,7 +44,10 @@ def apply_float(operator: str, values: list[float]) -> float:
 
 
 def arithmetic(operator: str, values: list[Any]) -> Any:
-    """Return the value of an operator; None for a function."""
+    """Return the result of an operator on values of any type with arithmetic; None for a function.
+
+    `operator` is "+", "-", "*", "/", "^" or "negate"; `values` are its one or two operands.
+    """
     first, *rest = values
     match operator:
         case "+":
@@ -142,7 +150,13 @@ class Number(Expression):
 
 
 def out_of_bounds(value: float, low: float | None, high: float | None) -> str:
-    """Return advice for a value out of bounds, as the end of an error message; else empty."""
+    """Return advice such as "give 2 or less" for a value out of bounds; empty if it is within them.
+
+    Args:
+        value: value to check. NaN counts as out of bounds.
+        low: smallest valid value, or None.
+        high: largest valid value, or None.
+    """
     if low is not None and not value >= low:
         least = "more than zero" if low == MORE_THAN_ZERO else f"{low:g} or more"
         return f"give {'zero or more' if low == 0 else least}"
@@ -202,7 +216,13 @@ class Parameter(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Operation(Expression):
-    """Operator or function applied to expressions."""
+    """Operator or function applied to expressions.
+
+    Attributes:
+        operator: "+", "-", "*", "/", "^", "negate", or a function in FUNCTIONS.
+        arguments: one or two operands.
+        depth: length of the longest chain of nested operations, at most 200.
+    """
 
     operator: str
     arguments: tuple[Expression, ...]
@@ -245,7 +265,18 @@ def expression(value: Scalar, where: str = "value") -> Expression:
 
 
 def operation(operator: str, *operands: Scalar) -> Expression:
-    """Apply an operator or function; if all operands are numbers, it is evaluated immediately."""
+    """Apply an operator or function to operands.
+
+    Args:
+        operator: "+", "-", "*", "/", "^", "negate", or a function in FUNCTIONS.
+        operands: its one or two operands.
+
+    Returns:
+        the operation; its value as a `Number` if all operands are numbers.
+
+    Raises:
+        ExpressionError: the value is not finite, or operations are nested more than 200 deep.
+    """
     arguments = tuple(expression(operand) for operand in operands)
     if all(isinstance(argument, Number) for argument in arguments):
         result = apply_float(operator, [a.value for a in arguments])  # type: ignore[attr-defined]
@@ -258,7 +289,15 @@ def operation(operator: str, *operands: Scalar) -> Expression:
 
 
 def finite(value: object, where: str) -> float:
-    """Return a finite value as a float, also from a 0-dimensional array or 1x1 DM; else raise."""
+    """Return a finite value as a float, also from a 0-dimensional array or a 1 x 1 DM.
+
+    Args:
+        value: value as the user wrote it.
+        where: component and field, for the error message.
+
+    Raises:
+        ExpressionError: the value is not a number, not finite, or True or False.
+    """
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     elif isinstance(value, DM) and value.is_scalar():
@@ -277,6 +316,10 @@ def finite(value: object, where: str) -> float:
 
 
 def _text(value: Expression, outer: int = 0) -> str:
+    """Return the text of an expression, in brackets if it binds weaker than the level `outer`.
+
+    Levels are those of `_PRECEDENCE`; 0 never adds brackets.
+    """
     if isinstance(value, Number):
         text = repr(value.value)
         text = text.removesuffix(".0")
@@ -307,7 +350,11 @@ _DEEPEST_NESTING = 100
 
 @lru_cache(maxsize=4096)
 def parse(text: str) -> Expression:
-    """Parse a text to an expression."""
+    """Parse a text of the grammar to an expression, with parameters for its symbols.
+
+    Raises:
+        ExpressionError: the text is not in the grammar, or is nested too deeply.
+    """
     parser = _Parser(text)
     value = parser.sum()
     if parser.token is not None:
@@ -316,7 +363,7 @@ def parse(text: str) -> Expression:
 
 
 class _Parser:
-    """Parser of a text with one token of lookahead."""
+    """Recursive-descent parser of a text with one token of lookahead, `token`."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -327,6 +374,10 @@ class _Parser:
         self.advance()
 
     def _tokens(self) -> Iterator[tuple[str, str]]:
+        """Yield (kind, text) of each token.
+
+        Kind is "number", "name" or "mark" (an operator or bracket).
+        """
         position, text = 0, self.text.rstrip()
         while position < len(text):
             match = TOKEN.match(text, position)
@@ -336,15 +387,18 @@ class _Parser:
             position = match.end()
 
     def fail(self, reason: str) -> NoReturn:
+        """Raise ExpressionError with the text and the reason."""
         raise ExpressionError(
             f"cannot read {quoted(self.text)}: {reason}; write numbers, symbols, + - * / ^,"
             " sin, cos, tan, sqrt, atan2 and pi"
         )
 
     def advance(self) -> None:
+        """Read the next token into `kind` and `token`; both are None at the end."""
         self.kind, self.token = next(self.tokens, (None, None))
 
     def accept(self, *marks: str) -> str | None:
+        """Read past the current token and return it if it is one of `marks`; else return None."""
         if self.kind == "mark" and self.token in marks:
             mark = self.token
             self.advance()
@@ -352,15 +406,18 @@ class _Parser:
         return None
 
     def expect(self, mark: str) -> None:
+        """Read past the operator or bracket `mark`; raise ExpressionError if it is not there."""
         if not self.accept(mark):
             self.fail(f"{mark!r} is missing")
 
     def deeper(self) -> None:
+        """Count one more level of nesting; raise ExpressionError beyond 100 levels."""
         self.depth += 1
         if self.depth > _DEEPEST_NESTING:
             self.fail("it is nested too deeply")
 
     def sum(self) -> Expression:
+        """Parse the rule `sum` of the grammar: products joined by + and -."""
         self.deeper()
         value = self.product()
         while mark := self.accept("+", "-"):
@@ -369,12 +426,14 @@ class _Parser:
         return value
 
     def product(self) -> Expression:
+        """Parse the rule `product` of the grammar: unary terms joined by * and /."""
         value = self.unary()
         while mark := self.accept("*", "/"):
             value = operation(mark, value, self.unary())
         return value
 
     def unary(self) -> Expression:
+        """Parse the rule `unary` of the grammar: a power with any number of signs."""
         negative = False
         while mark := self.accept("-", "+"):
             negative ^= mark == "-"
@@ -382,6 +441,7 @@ class _Parser:
         return -value if negative else value
 
     def power(self) -> Expression:
+        """Parse the rule `power` of the grammar: an atom, with an optional exponent."""
         base = self.atom()
         if not self.accept("^", "**"):
             return base
@@ -391,6 +451,7 @@ class _Parser:
         return operation("^", base, exponent)
 
     def atom(self) -> Expression:
+        """Parse the rule `atom` of the grammar: a number, a name, a function call, or brackets."""
         kind, token = self.kind, self.token
         if kind is None or token is None:
             self.fail("it ends too early")
@@ -406,6 +467,7 @@ class _Parser:
         return self._named(token)
 
     def _named(self, name: str) -> Expression:
+        """Return the constant, the parameter or the function call that starts with `name`."""
         if name in CONSTANTS:
             return Number(CONSTANTS[name])
         if not self.accept("("):

@@ -26,7 +26,11 @@ T = TypeVar("T")
 
 
 def parameters_of(value: Expression) -> Iterator[Parameter]:
-    """Yield the parameters of an expression in the order of the text, including repetitions."""
+    """Yield the parameters of an expression in the order of the text, including repetitions.
+
+    Args:
+        value: expression.
+    """
     if isinstance(value, Parameter):
         yield value
     elif isinstance(value, Operation):
@@ -35,7 +39,12 @@ def parameters_of(value: Expression) -> Iterator[Parameter]:
 
 
 def renamed(value: Expression, prefix: str) -> Expression:
-    """Return the expression with a prefix on every parameter name: L2 becomes prefix.L2."""
+    """Return the expression with a prefix on every parameter name: `L2` becomes `prefix.L2`.
+
+    Args:
+        value: expression.
+        prefix: text before the names, without the dot.
+    """
     if isinstance(value, Parameter):
         return replace(value, name=f"{prefix}.{value.name}")
     if isinstance(value, Operation):
@@ -44,7 +53,11 @@ def renamed(value: Expression, prefix: str) -> Expression:
 
 
 def without_defaults(value: Expression) -> Expression:
-    """Return the expression with parameters that have no default value."""
+    """Return the expression with parameters that have no default value.
+
+    Args:
+        value: expression.
+    """
     if isinstance(value, Parameter):
         return replace(value, default=None)
     if isinstance(value, Operation):
@@ -53,9 +66,13 @@ def without_defaults(value: Expression) -> Expression:
 
 
 def with_values(value: Expression, values: Mapping[str, float]) -> Expression:
-    """Return the expression with numbers instead of parameters with known values.
+    """Return the expression with numbers in place of the parameters with known values.
 
     The default of a parameter is its value if `values` does not contain it.
+
+    Args:
+        value: expression.
+        values: value by parameter name. Parameters without value and default remain.
 
     Raises:
         ExpressionError: the expression has no finite value.
@@ -69,14 +86,26 @@ def with_values(value: Expression, values: Mapping[str, float]) -> Expression:
 
 
 def to_sx(value: Scalar, symbols: Mapping[str, SX]) -> SX:
-    """Return the expression in CasADi symbols, by parameter name."""
+    """Return a number, text or expression as a CasADi expression.
+
+    Args:
+        value: number, text or expression.
+        symbols: CasADi scalar of each parameter, by parameter name.
+
+    Raises:
+        KeyError: a parameter is not in `symbols`.
+    """
     return _fold(expression(value), SX, lambda p: symbols[p.name], _apply_sx)
 
 
 def to_float(value: Scalar, values: Mapping[str, float] | None = None) -> float | None:
-    """Return the value of an expression, with parameters from `values` or by default.
+    """Return the value of a number, text or expression.
 
     None if a parameter has no value, or if the result is not finite, such as 1/A with A = 0.
+
+    Args:
+        value: number, text or expression.
+        values: value by parameter name; the default of a parameter is used if it is not contained.
     """
     known = values or {}
 
@@ -94,6 +123,11 @@ def _fold(
     symbol: Callable[[Parameter], T],
     apply: Callable[[str, list[T]], T],
 ) -> T:
+    """Evaluate an expression bottom-up in a type T.
+
+    `number` converts numbers, `symbol` converts parameters, and `apply` evaluates an operator (by
+    its name) on operands of the type T.
+    """
     if isinstance(value, Number):
         return number(value.value)
     if isinstance(value, Parameter):
@@ -103,5 +137,6 @@ def _fold(
 
 
 def _apply_sx(operator: str, values: list[SX]) -> SX:
+    """Return the result of an operator or function, by its name, on CasADi scalars."""
     result = arithmetic(operator, values)
     return SX(getattr(casadi, operator)(*values) if result is None else result)

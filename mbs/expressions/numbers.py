@@ -37,7 +37,16 @@ def number(value: Scalar, where: str) -> float:
 
 
 def whole_number(value: Scalar, where: str) -> int:
-    """Return the integer that a text or an expression is; arguments and errors as for `number`."""
+    """Return the value of a whole number, of its text, or of an expression with known symbols.
+
+    Args:
+        value: number, text or expression as the user wrote it.
+        where: name of the file, field or option, for the error message.
+
+    Raises:
+        ExpressionError: the text is not in the grammar, a symbol has no value, or the value is not
+            whole.
+    """
     found = _find(value, where)
     if found is None or not found.is_integer():
         raise ExpressionError(f"{where}: {_given(value)} is not a whole number; write one")
@@ -45,10 +54,15 @@ def whole_number(value: Scalar, where: str) -> int:
 
 
 def _find(value: Scalar, where: str) -> float | None:
+    """Return the value; None for True, False, unknown symbols and values that are not finite.
+
+    `where` is named in the message of the ExpressionError that a wrong text raises.
+    """
     return None if isinstance(value, bool) else to_float(expression(value, where))
 
 
 def _given(value: Scalar) -> str:
+    """Return the text of the value for error messages, in quotation marks."""
     return quoted(str(value) if isinstance(value, Expression) else value)
 
 

@@ -40,7 +40,7 @@ class Limits:
 
 
 def limits(system: System, *, speed: Largest = None, effort: Largest = None) -> Limits:
-    """Bounds of positions, velocities and efforts of a system, for optimal control.
+    """Return the bounds of positions, velocities and efforts of a system, for optimal control.
 
     Position bounds are the intersection of joint limits and stops. Elements of unit quaternions are
     between -1 and 1. By default velocity and effort bounds are `velocity` and `effort` of the joint
@@ -80,7 +80,7 @@ def limits(system: System, *, speed: Largest = None, effort: Largest = None) -> 
 
 
 def _ends(ranges: list[tuple[float, float] | None]) -> tuple[Array, Array]:
-    """Return arrays of lower and upper bounds; infinite for None."""
+    """Return arrays (n,) of lower and upper bounds; infinite for None."""
     lower, upper = zip(*(given or (-np.inf, np.inf) for given in ranges), strict=True)
     return np.array(lower, dtype=float), np.array(upper, dtype=float)
 
@@ -114,10 +114,10 @@ def _number(limit: SX | None, otherwise: float) -> float:
 
 
 def _magnitudes(system: System, what: str, given: Largest) -> list[tuple[int, float]]:
-    """Return (index in v, largest magnitude) for each named velocity of the user's mapping.
+    """Return (index in v, largest magnitude) for each entry of a mapping from names to numbers.
 
-    Raises:
-        ModelError: a name is unknown, or a value is not positive.
+    `what` is the argument in messages. Raise ModelError if a name is unknown, or a value is not
+    positive.
     """
     if given is not None and not isinstance(given, Mapping):
         raise ModelError(

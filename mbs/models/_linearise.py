@@ -157,10 +157,9 @@ class Linearisation:
         return LinearModel(A, B, C, D, self.x, self.u, self.y)
 
     def _require_mode(self, *point: Any) -> None:
-        """Raise ModelError if the contacts at this state are not in the requested mode.
+        """Raise ModelError if the contacts at a state are not in the requested mode.
 
-        Args:
-            point: numeric inputs of `holds`.
+        `point` are the numeric inputs of `holds`.
         """
         assert self.holds is not None
         zero, positive = (np.array(value).ravel() for value in self.holds.call(point))
@@ -189,7 +188,9 @@ def linearise(
     outputs: Sequence[str] | None = None,
     mode: Mapping[str, float] | None = None,
 ) -> Linearisation:
-    """Linearise the equations of motion about any state, with loops and rolling constraints.
+    """Return the linearised equations of motion as functions of the state.
+
+    Loops and rolling constraints are included.
 
     A sticking contact keeps one velocity at zero, which adds a zero eigenvalue.
 
@@ -266,7 +267,10 @@ def linearise(
 
 
 def _modes(system: System, mode: Mapping[str, float]) -> tuple[float, ...]:
-    """Return the 2 k modes of the k contact rows: limits, then directions of sliding."""
+    """Return the 2 k modes of the k contact rows: limits, then directions of sliding.
+
+    `mode` is given by name; other modes are 0. Raise ModelError for unknown names or other values.
+    """
     contacts = contacts_of(system)
     require_lasting_rows(system, contacts)
     elements = (*contacts.stops, *contacts.frictions)
@@ -283,7 +287,7 @@ def _modes(system: System, mode: Mapping[str, float]) -> tuple[float, ...]:
 
 
 def _words(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Describe the zero quantities of `holds`, and each event that a non-positive one means."""
+    """Return descriptions of the elements of `zero` and `positive` of `holds`, for messages."""
     contacts = contacts_of(system)
     still = [f"the velocity on which {name} acts" for name in contacts.names]
     still += [f"the distance of {name} from its limit" for name in contacts.names]
@@ -300,11 +304,10 @@ def _words(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def _contact(
     system: System, s: ModelSymbols, tau: SX, modes: Sequence[float]
 ) -> tuple[ContactEquations, tuple[SX, SX]] | None:
-    """Contact equations with the mode symbols replaced by the numbers `modes`.
+    """Return the contact equations with the mode symbols replaced by the numbers `modes`.
 
-    Returns:
-        the equations, then the indicators that must be positive (5 k, 1) and the flags of stuck
-        rows (k, 1). None for a system without contacts.
+    The second result are the indicators that must be positive (5 k, 1) and the flags of stuck rows
+    (k, 1). None for a system without contacts.
     """
     found = contact_equations(system, s.q, s.v_tree, tau, {})
     if found is None:
@@ -412,7 +415,10 @@ def _selected(system: System, N: SX) -> SX:
 
 
 def _outputs(system: System, s: ModelSymbols, a: SX, tau: SX, names: Sequence[str]) -> SX:
-    """(k, 1) expressions of the requested outputs."""
+    """Return the expressions (k, 1) of the outputs `names`.
+
+    `a` (nv, 1) are the accelerations and `tau` (nv, 1) the joint efforts of the tree.
+    """
     values: dict[str, SX] = {}
     for k, coordinate in enumerate(system.coordinates):
         values[f"{coordinate.name}.q"] = s.q[k]

@@ -54,7 +54,7 @@ def variable(number: int) -> Polynomial:
 
 
 def total(a: Polynomial, b: Polynomial, sign: int = 1) -> Polynomial:
-    """Return the sum a + sign b."""
+    """Return the polynomial a + sign b. Raise NotTrigonometric if it is too long."""
     result = dict(a)
     for monomial, coefficient in b.items():
         _add(result, monomial, sign * coefficient)
@@ -62,7 +62,12 @@ def total(a: Polynomial, b: Polynomial, sign: int = 1) -> Polynomial:
 
 
 def product(a: Polynomial, b: Polynomial) -> Polynomial:
-    """Return the product of two polynomials."""
+    """Return the product of two polynomials. Raise NotTrigonometric if it is too long.
+
+    Args:
+        a: first factor.
+        b: second factor.
+    """
     result: Polynomial = {}
     for m, x in a.items():
         for n, y in b.items():
@@ -71,7 +76,7 @@ def product(a: Polynomial, b: Polynomial) -> Polynomial:
 
 
 def _add(result: Polynomial, monomial: Monomial, coefficient: Fraction) -> None:
-    """Add a term to a polynomial in place; a sum of rounding size becomes zero."""
+    """Add coefficient times monomial to a polynomial, in place; rounding errors become zero."""
     before = result.get(monomial, Fraction(0))
     both = before + coefficient
     cancelled = abs(both) <= _ROUNDING * (abs(before) + abs(coefficient))
@@ -94,7 +99,11 @@ def _within_reason(polynomial: Polynomial) -> Polynomial:
 
 
 def polynomial_of(expression: SX, variables: SX) -> Polynomial:
-    """Convert an expression to a polynomial in variables, their sines and cosines.
+    """Return an expression as a polynomial in variables, their sines and cosines.
+
+    Args:
+        expression: scalar expression.
+        variables: (n, 1) symbols.
 
     Raises:
         NotTrigonometric: the expression is not such a polynomial, or is too long.
@@ -135,7 +144,7 @@ def _value(graph: Graph, number: int, values: list[Polynomial], least: float) ->
 
 
 def _operation(op: int, operands: list[Polynomial]) -> Polynomial:
-    """Return the polynomial of a CasADi operation (`op`) on polynomials."""
+    """Return the polynomial of the CasADi operation `op`; raise NotTrigonometric if it is none."""
     two: dict[int, Callable[[Polynomial, Polynomial], Polynomial]] = {
         casadi.OP_ADD: total,
         casadi.OP_SUB: lambda a, b: total(a, b, -1),
@@ -150,14 +159,20 @@ def _operation(op: int, operands: list[Polynomial]) -> Polynomial:
 
 
 def _constant(value: float, least: float) -> Polynomial:
-    """Constant polynomial; zero for a number up to `least`, the rounding error of the graph."""
+    """Return the constant polynomial; zero for a number up to `least`, its rounding error.
+
+    Raise NotTrigonometric if the number is not finite.
+    """
     if not math.isfinite(value):
         raise NotTrigonometric
     return {(): Fraction(repr(value))} if abs(value) > least else {}
 
 
 def _sine_cosine(angle: Polynomial) -> tuple[Polynomial, Polynomial]:
-    """Sine and cosine of a sum of variables, expanded by the addition theorems."""
+    """Return sine and cosine of a sum of variables, expanded by the addition theorems.
+
+    Raise NotTrigonometric unless the factors are whole numbers from -4 to 4.
+    """
     s: Polynomial = {}
     c: Polynomial = {(): Fraction(1)}
     for monomial, times in angle.items():
@@ -177,7 +192,12 @@ def _sine_cosine(angle: Polynomial) -> tuple[Polynomial, Polynomial]:
 
 
 def lowered(polynomial: Polynomial, which: Literal["s", "c"]) -> Polynomial:
-    """Eliminate even powers of sines ("s") or of cosines ("c") by s^2 + c^2 = 1."""
+    """Eliminate even powers of sines ("s") or of cosines ("c") by s^2 + c^2 = 1.
+
+    Args:
+        polynomial: polynomial to reduce.
+        which: kind to eliminate.
+    """
     result: Polynomial = {}
     for monomial, coefficient in polynomial.items():
         term: Polynomial = {(): coefficient}
@@ -196,7 +216,7 @@ def lowered(polynomial: Polynomial, which: Literal["s", "c"]) -> Polynomial:
 
 
 def with_sums_of_angles(polynomial: Polynomial) -> Polynomial:
-    """Convert products of sines and cosines to sums of sines and cosines of sums of angles."""
+    """Return a polynomial with products of sines and cosines as functions of sums of angles."""
     result: Polynomial = {}
     for monomial, coefficient in polynomial.items():
         rest = tuple((atom, power) for atom, power in monomial if atom[0] == "x")
@@ -209,7 +229,10 @@ def with_sums_of_angles(polynomial: Polynomial) -> Polynomial:
 
 
 def _times_wave(waves: Polynomial, atom: Atom) -> Polynomial:
-    """Multiply a sum of sines and cosines by `atom`: 2 cos a cos b = cos(a - b) + cos(a + b)."""
+    """Return a sum of sines and cosines times the sine or cosine `atom`, again as a sum.
+
+    The identities are such as 2 cos a cos b = cos(a - b) + cos(a + b).
+    """
     result: Polynomial = {}
     for monomial, coefficient in waves.items():
         if not monomial:
@@ -269,7 +292,7 @@ class Factored:
 
 
 def factored(polynomial: Polynomial) -> Factored:
-    """Factor a polynomial, and write each factor in its shortest form.
+    """Return a polynomial as a product of factors, each in its shortest form.
 
     Raises:
         NotTrigonometric: the polynomial is too long.
@@ -282,13 +305,13 @@ def factored(polynomial: Polynomial) -> Factored:
 
 
 def _shortest(polynomial: Polynomial) -> Polynomial:
-    """Return a polynomial, with sums of angles if that has fewer terms."""
+    """Return the polynomial, or its form with sums of angles if that has fewer terms."""
     summed = with_sums_of_angles(polynomial)
     return summed if len(summed) < len(polynomial) else polynomial
 
 
 def _factored(polynomial: Polynomial) -> Factored:
-    """Return a trigonometric polynomial as a product of factors with powers."""
+    """Return a polynomial as a product of powers; raise NotTrigonometric if it is too long."""
     if len(polynomial) == 1:
         ((monomial, coefficient),) = polynomial.items()
         return Factored(
@@ -314,7 +337,7 @@ def _factored(polynomial: Polynomial) -> Factored:
 
 
 def _from_powers(terms: Mapping[tuple[int, ...], object], atoms: list[Atom]) -> Polynomial:
-    """Return a polynomial from coefficients by the exponents of its atoms."""
+    """Return the polynomial with given coefficients, by the exponents of the atoms."""
     return {
         tuple((atom, power) for atom, power in zip(atoms, powers, strict=True) if power): Fraction(
             str(coefficient)
@@ -343,7 +366,7 @@ def value(polynomial: Polynomial, variables: SX) -> SX:
 
 
 def text(polynomial: Polynomial, names: list[str], name_of_angle: Callable[[Atom], str]) -> str:
-    """Print a polynomial; each product has number, variables, cosines and sines in this order.
+    """Return a polynomial as text; a product has number, variables, cosines, sines in this order.
 
     Args:
         polynomial: polynomial to print.
@@ -386,7 +409,7 @@ class Writer:
         ]
 
     def is_constant(self, polynomial: Polynomial) -> bool:
-        """Whether a polynomial is independent of all positions."""
+        """Return whether a polynomial is independent of all positions."""
         return all(
             number >= self._positions
             for monomial in polynomial
@@ -399,6 +422,7 @@ class Writer:
         return text(polynomial, self._names, self._angle)
 
     def _angle(self, atom: Atom) -> str:
+        """Return the text of a sine or cosine: S23, or sin(q2 + q3)."""
         kind, of = atom
         if all(times == 1 and self._short[number] for number, times in of):
             return kind.upper() + "".join(self._short[number] for number, _ in of)
@@ -465,7 +489,9 @@ def singularities(
     expressed_in: str | int = "base",
     coordinates: str = "independent",
 ) -> Singularities:
-    """Singular configurations of a frame, as factors of the determinant of its Jacobian.
+    """Return the singular configurations of a frame, as factors of a determinant.
+
+    It is the determinant of the Jacobian of the frame, or of a square submatrix.
 
     Each diagonal block of the block triangular Jacobian contributes its determinant. Determinants
     of blocks of up to three rows are factored as polynomials in sines and cosines. The determinant
@@ -538,7 +564,10 @@ def _constant_and_factors(
 
 
 def _parts(system: System, block: Block, det: SX, variables: SX) -> Factored | None:
-    """Factors of the determinant of a block; None if it is too large or the check fails."""
+    """Return the factors of the determinant of a block in `variables`, checked at random points.
+
+    None if the block is too large or the check fails.
+    """
     if block.size > _FACTORED:
         return None
     try:
@@ -556,10 +585,9 @@ def _parts(system: System, block: Block, det: SX, variables: SX) -> Factored | N
 
 
 def _scale(polynomial: Polynomial) -> tuple[Polynomial, Fraction]:
-    """Scale a polynomial to a positive first coefficient and coefficients up to 12.
+    """Return a polynomial with a positive first coefficient and coefficients up to 12.
 
-    Returns:
-        scaled polynomial and the scale by which to multiply it.
+    The second result is the scale by which it was divided.
     """
     first = next(iter(polynomial.values()))
     largest = max(abs(coefficient) for coefficient in polynomial.values())
@@ -583,7 +611,7 @@ def _product_text(number: Fraction, constants: dict[str, int]) -> str:
 
 
 def _label(chosen: Selection, block: Block) -> str:
-    """Return text for a block of the Jacobian that is not factored."""
+    """Return a description of a block of the Jacobian that is not factored."""
     names = ", ".join(chosen.names[column] for column in block.columns)
     return f"determinant of the {block.size} x {block.size} block of {names}"
 

@@ -54,7 +54,10 @@ class TreeCore:
 
     @property
     def inertia_matrix(self) -> Function:
-        """Mass matrix ``inertia(q) -> A``, not differentiable; see `inertia_matrix`."""
+        """Inertia matrix (mass matrix) ``inertia(q) -> A``, not differentiable.
+
+        See `inertia_matrix`.
+        """
         return core_function(self.system, "inertia")
 
     @property
@@ -64,17 +67,17 @@ class TreeCore:
 
     @property
     def idm_derivatives(self) -> Function:
-        """Derivatives of inverse dynamics; see `inverse_dynamics_derivatives`.
+        """``idm_derivatives(q, v, a) -> dtau_dq, dtau_dv, dtau_da, tau``, not differentiable.
 
-        ``idm_derivatives(q, v, a) -> dtau_dq, dtau_dv, dtau_da, tau``. Not differentiable.
+        These are derivatives of inverse dynamics, see `inverse_dynamics_derivatives`.
         """
         return core_function(self.system, "idm_derivatives")
 
     @property
     def ddm_derivatives(self) -> Function:
-        """Derivatives of forward dynamics; see `direct_dynamics_derivatives`.
+        """``ddm_derivatives(q, v, tau) -> da_dq, da_dv, da_dtau, a``, not differentiable.
 
-        ``ddm_derivatives(q, v, tau) -> da_dq, da_dv, da_dtau, a``. Not differentiable.
+        These are derivatives of forward dynamics, see `direct_dynamics_derivatives`.
         """
         return core_function(self.system, "ddm_derivatives")
 
@@ -119,7 +122,10 @@ class CoreLibrary:
 
 
 def core_library(system: System) -> CoreLibrary:
-    """Compile, or load from the cache, the library of all models of a tree.
+    """Return the library of all models of a tree, compiled or from the cache.
+
+    Args:
+        system: open mechanism.
 
     Raises:
         ModelError: the tree core does not support the system.
@@ -143,7 +149,7 @@ _BY_PARAMETERS = [by_parameters(name) for name in ("idm", "ddm")]
 
 
 def _by_parameters(system: System, files: Mapping[str, str]) -> str:
-    """C source whose parameter derivatives are built from the equations at their first call.
+    """Return C source whose parameter derivatives are built from equations at their first call.
 
     The source works only in the current process.
 
@@ -171,6 +177,9 @@ def core_function(system: System, name: str) -> Function:
     Args:
         system: open mechanism.
         name: key of `CoreLibrary.shapes`.
+
+    Raises:
+        ModelError: the name starts with "ddm", and a joint moves no inertia.
     """
 
     def build() -> Function:

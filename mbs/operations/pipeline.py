@@ -141,10 +141,18 @@ def simplification(
     passes: Iterable[str] | None = None,
     parameters: Iterable[str] = ("p",),
 ) -> Simplification:
-    """Simplify a Function as `simplify` does, with a report of the operations that passes save.
+    """Simplify a Function as `simplify` does, and report the operations that each pass saves.
 
     Passes are repeated until none saves further operations. Each result is compared with the given
     Function at random points. It is discarded if it needs more operations.
+
+    Args:
+        function: Function of scalar operations, or a Function that can be expanded to them.
+        passes: names of passes, see `PASSES`; default: all.
+        parameters: names of inputs that are constant from call to call.
+
+    Raises:
+        ModelError: the Function has no scalar operations or no finite values, or a pass is unknown.
     """
     chosen, names = _choose(passes), tuple(parameters)
     graph, steps = graph_of(function), list[PassReport]()
@@ -164,6 +172,10 @@ def simplification(
 
 
 def _choose(passes: Iterable[str] | None) -> Sequence[Pass]:
+    """Return the passes with the given names, in the order of PASSES; all passes for None.
+
+    Raise ModelError if a name is unknown.
+    """
     if passes is None:
         return PASSES
     chosen, known = set(passes), [p.name for p in PASSES]
@@ -175,6 +187,11 @@ def _choose(passes: Iterable[str] | None) -> Sequence[Pass]:
 def _make(
     one: Pass, graph: Graph, parameters: tuple[str, ...], proof: Witness
 ) -> tuple[Graph, PassReport]:
+    """Apply the pass `one` to a graph; return the graph to continue with, and a report.
+
+    The result is kept if it is cheaper. A kept result whose values differ from `proof` raises
+    ModelError.
+    """
     started = time.perf_counter()
     made = one.apply(graph, parameters)
     before, after = count_graph(graph, parameters), count_graph(made, parameters)
@@ -188,7 +205,10 @@ def _make(
 
 
 def _function_like(function: Function, graph: Graph) -> Function:
-    """Return the Function of a graph, with defaults (for models also checks) of `function`."""
+    """Return the Function of a graph, with the default inputs of `function`.
+
+    A model also keeps its checks.
+    """
     defaults = [function.default_in(k) for k in range(function.n_in())]
     made = function_of(graph, defaults)
     rewritten: Any = getattr(function, "rewritten", None)
@@ -262,7 +282,10 @@ def split(function: Function, parameters: Iterable[str] = ("p",)) -> Split:
 
 
 def _needed_of_parameters(graph: Graph, names: set[str]) -> list[int]:
-    """Return the parameter-only nodes that outputs or changing nodes use, without constants."""
+    """Return the parameter-only nodes that outputs or other nodes use, without constants.
+
+    `names` are the names of the parameters.
+    """
     fixed = graph.fixed_by(names)
     used = [number for result in graph.results for number in result]
     for number in range(len(graph.nodes)):
@@ -272,14 +295,20 @@ def _needed_of_parameters(graph: Graph, names: set[str]) -> list[int]:
 
 
 def _setup(graph: Graph, names: set[str], kept: list[int], column: Port) -> Graph:
-    """Return the graph that computes the kept nodes from the parameters."""
+    """Return the graph that computes the nodes `kept` from the parameters, as the output `column`.
+
+    `names` are the names of the parameters.
+    """
     inputs = tuple(port for port in graph.inputs if port.name in names)
     nodes = _renumber(graph, [port.name for port in inputs])
     return Graph(f"{graph.name}_setup", inputs, (column,), nodes, (tuple(kept),))
 
 
 def _main(graph: Graph, names: set[str], kept: list[int], column: Port) -> Graph:
-    """Return the graph whose last input contains the kept nodes."""
+    """Return the graph of the other operations, whose last input `column` has the nodes `kept`.
+
+    `names` are the names of the parameters.
+    """
     inputs = tuple(port for port in graph.inputs if port.name not in names)
     nodes = list(_renumber(graph, [port.name for port in inputs]))
     for position, number in enumerate(kept):
@@ -288,7 +317,10 @@ def _main(graph: Graph, names: set[str], kept: list[int], column: Port) -> Graph
 
 
 def _renumber(graph: Graph, names: list[str]) -> tuple[Node, ...]:
-    """Return nodes in which input indices refer to `names`; other nodes are unchanged."""
+    """Return the nodes of a graph for the inputs `names` in this order.
+
+    Other inputs are unchanged.
+    """
     index = {k: names.index(p.name) for k, p in enumerate(graph.inputs) if p.name in names}
 
     def renumber(node: Node) -> Node:
@@ -345,13 +377,16 @@ def names_found(function: Function, named: Function) -> Function:
 
 
 def _scalars(named: Function, point: Sequence[DM], count: int) -> NDArray[np.float64]:
-    """Return the named scalars at a point; NaN for outputs that are not scalar."""
+    """Return the named scalars at a point; NaN for outputs that are not scalar.
+
+    `count` is the number of outputs of `named` before the named scalars.
+    """
     outputs = Function.call(named, list(point))[count:]
     return np.array([float(x) if x.shape == (1, 1) else np.nan for x in outputs])
 
 
 def _values(graph: Graph, points: Sequence[Sequence[DM]]) -> NDArray[np.float64]:
-    """Return the values of all nodes at all points, (nodes, points)."""
+    """Return the values (nodes, points) of all nodes of a graph at all points."""
     size = len(graph.nodes)
     port, numbers = Port("nodes", Sparsity.dense(size, 1)), tuple(range(size))
     every = function_of(replace(graph, outputs=(port,), results=(numbers,)))

@@ -63,7 +63,10 @@ class Witness:
                 )
 
     def _rounding(self, output: int) -> float:
-        """Return the change of an output by perturbed inputs: the rounding error of a zero."""
+        """Return the largest change of an output, times 10, by tiny random changes of the inputs.
+
+        It bounds the rounding error of an output that should be zero. `output` is its index.
+        """
         random, found = np.random.default_rng(0), 0.0
         for point, expected in zip(self.points, self.values, strict=True):
             for _ in range(_NUDGES):
@@ -74,7 +77,11 @@ class Witness:
 
 
 def witness(function: Function, seed: int = 0) -> Witness:
-    """Evaluate a Function at random points at which its elements are finite, or most of them.
+    """Evaluate a Function at three random points at which all, or most, of its elements are finite.
+
+    Args:
+        function: Function to evaluate.
+        seed: seed of the random numbers.
 
     Raises:
         ModelError: no output element is finite at any of many points.
@@ -102,15 +109,23 @@ def witness(function: Function, seed: int = 0) -> Witness:
 
 
 def _values(function: Function, point: Sequence[DM]) -> Values:
+    """Return the non-zero elements of each output of a Function at a point.
+
+    `point` has one value per input.
+    """
     outputs = Function.call(function, list(point))
     return tuple(np.array(DM(output).nonzeros(), dtype=float) for output in outputs)
 
 
 def _within(one: np.ndarray, other: np.ndarray, allowed: float) -> bool:
-    """Return whether two arrays differ by at most `allowed` where the first is finite."""
+    """Return whether two arrays differ by at most `allowed`.
+
+    Elements where `one` is not finite pass.
+    """
     known = np.isfinite(one)
     return bool(np.all(np.abs(one[known] - other[known]) <= allowed))
 
 
 def _largest(values: np.ndarray) -> float:
+    """Return the largest magnitude of the finite elements; zero if there are none."""
     return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))

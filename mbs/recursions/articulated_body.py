@@ -59,7 +59,7 @@ class ArticulatedInertia:
 
     @staticmethod
     def of(body: Inertia) -> ArticulatedInertia:
-        """Return the articulated inertia of a single rigid body."""
+        """Return the articulated inertia of a single rigid body, in the same frame."""
         return ArticulatedInertia(
             casadi.densify(body.m * SX.eye(3)), casadi.densify(-skew(body.ms)), body.J
         )
@@ -69,19 +69,33 @@ class ArticulatedInertia:
         return ArticulatedInertia(self.M + other.M, self.H + other.H, self.J + other.J)
 
     def rotate(self, R: Rotation) -> ArticulatedInertia:
-        """Express in the axes of frame i, where R is the orientation of the current axes in i."""
+        """Transform to axes with the same origin.
+
+        R maps a vector from current axes to the new axes.
+        """
         return ArticulatedInertia(
             R.apply_to_tensor(self.M), R.apply_to_square(self.H), R.apply_to_tensor(self.J)
         )
 
     def shift(self, axis: int, t: SX) -> ArticulatedInertia:
-        """Displace the body by t [m] along a coordinate axis, with ten products."""
+        """Return the inertia of the body displaced by t along an axis, about the same origin.
+
+        The cost is ten products.
+
+        Args:
+            axis: index of the axis: 0, 1 or 2 for x, y or z.
+            t: displacement [m].
+        """
         if t.is_zero():
             return self
         return ArticulatedInertia(self.M, *_slid(self.M, self.H, self.J, t, axis))
 
     def column(self, direction: int) -> SX:
-        """(6, 1) wrench of a unit acceleration along one component (0 to 5) of a twist."""
+        """Return the wrench (6, 1), force then moment, of a unit acceleration in one direction.
+
+        Args:
+            direction: index of the direction in a twist [linear; angular], 0 to 5.
+        """
         if direction < 3:
             return casadi.vertcat(self.M[:, direction], self.H[direction, :].T)
         return casadi.vertcat(self.H[:, direction - 3], self.J[:, direction - 3])
@@ -99,7 +113,10 @@ class ArticulatedInertia:
 
 @formula((3, 3), (3, 3), (3, 3), (1, 1))
 def _slid(M: SX, old: SX, tensor: SX, t: SX, axis: int) -> tuple[SX, SX]:
-    """Return H and J of an articulated body displaced by t [m] along a coordinate axis."""
+    """Return H and J of an articulated body displaced by t [m] along an axis (0, 1 or 2).
+
+    `M`, `old` and `tensor` are its present M, H and J.
+    """
     k, h = (axis + 1) % 3, (axis + 2) % 3
     H, J = SX(old), SX(tensor)
     H[:, k] -= t * M[:, h]
@@ -117,7 +134,8 @@ def _slid(M: SX, old: SX, tensor: SX, t: SX, axis: int) -> tuple[SX, SX]:
 def _without(M: SX, H: SX, J: SX, column: SX, g: SX, own: SX, direction: int) -> tuple[SX, SX, SX]:
     """Return M, H and J of an articulated body after elimination of a joint velocity.
 
-    Arguments `column`, `g` and `own` are column, gain and rest of its `Pivot`.
+    `column`, `g` and `own` are column, gain and rest of its `Pivot`; `direction` is its index (0 to
+    5).
     """
     k, u = direction % 3, SX(column)
     u[direction] = 0
@@ -172,20 +190,30 @@ class Pivot:
 
     @staticmethod
     def of(body: ArticulatedInertia, direction: int, drive: RotorDrive) -> Pivot:
-        """Return the pivot of one direction of a body, with the drive of the joint."""
+        """Return the pivot that eliminates one velocity of the joint of a body.
+
+        Args:
+            body: articulated inertia of the link after the joint, in the frame of the joint.
+            direction: index of the velocity in a twist [linear; angular], 0 to 5.
+            drive: inertia of the drive of the joint.
+        """
         column = body.column(direction)
         return Pivot(direction, *_pivot(column, drive.inertia, drive.momentum, direction))
 
     def transmit(self, wrench: SX, effort: SX) -> tuple[SX, SX]:
-        """Eliminate a joint from the wrench (6, 1) of a body at zero joint acceleration.
+        """Return the wrench that passes the joint, and the effort left to accelerate it.
+
+        Args:
+            wrench: (6, 1) wrench that the body needs at zero joint acceleration.
+            effort: joint effort.
 
         Returns:
-            Wrench on the antecedent, and the effort left to accelerate the joint.
+            wrench (6, 1) on the antecedent, and effort left to accelerate the joint.
         """
         return _transmitted(wrench, effort, self.gain, self.ratio, self.direction)
 
     def accelerate(self, twist: SX, left: SX) -> tuple[SX, SX]:
-        """Return the acceleration (6, 1) of the link after the joint, and of the joint.
+        """Return the acceleration (6, 1) of the link after the joint, and the joint acceleration.
 
         Args:
             twist: (6, 1) acceleration before the joint.
@@ -196,7 +224,10 @@ class Pivot:
 
 @formula((6, 1), (1, 1), (3, 1))
 def _pivot(column: SX, inertia: SX, momentum: SX, direction: int) -> tuple[SX, SX, SX, SX, SX, SX]:
-    """Compute column, rest, size, inverse, gain and ratio of a pivot."""
+    """Return column, rest, size, inverse, gain and ratio of a `Pivot`.
+
+    `column` (6, 1) is that of the body; `inertia` and `momentum` are those of the `RotorDrive`.
+    """
     column = SX(column)
     column[3:] += momentum
     D = column[direction] + inertia
@@ -210,7 +241,10 @@ def _pivot(column: SX, inertia: SX, momentum: SX, direction: int) -> tuple[SX, S
 
 @formula((6, 1), (1, 1), (6, 1), (1, 1))
 def _transmitted(wrench: SX, effort: SX, gain: SX, ratio: SX, direction: int) -> tuple[SX, SX]:
-    """Return wrench and remaining effort of `Pivot.transmit`."""
+    """Return the wrench (6, 1) and the remaining effort of `Pivot.transmit`.
+
+    Arguments as in `Pivot`.
+    """
     left = effort - wrench[direction]
     wrench = wrench - gain * left
     wrench[direction] = effort - ratio * left
@@ -221,7 +255,10 @@ def _transmitted(wrench: SX, effort: SX, gain: SX, ratio: SX, direction: int) ->
 def _accelerated(
     twist: SX, left: SX, gain: SX, inverse: SX, ratio: SX, direction: int
 ) -> tuple[SX, SX]:
-    """Return the acceleration after a joint and the joint acceleration of `Pivot.accelerate`."""
+    """Return the acceleration (6, 1) after a joint and the joint acceleration.
+
+    See `Pivot.accelerate`.
+    """
     before = twist[direction]
     own = casadi.dot(gain, twist) - inverse * left + ratio * before
     twist = SX(twist)
@@ -230,7 +267,10 @@ def _accelerated(
 
 
 def _symmetric_product(a: SX, b: SX) -> SX:
-    """Return the product a b', which must be symmetric, with six multiplications."""
+    """Return the outer product a b' (3, 3) of (3, 1) vectors, which must be symmetric.
+
+    Six multiplications are needed.
+    """
     product = zeros(3, 3)
     for row in range(3):
         for column in range(row, 3):
@@ -272,6 +312,9 @@ def solve_inertia(tree: Tree, poses: list[LinkPose], right: SX) -> SX:
         tree: links, rotors included.
         poses: pose of each link relative to its antecedent.
         right: (nv, m) right-hand sides, such as joint efforts.
+
+    Returns:
+        x (nv, m), such as joint accelerations due to efforts at rest without gravity.
     """
     poses, bodies = shift_frames(tree, poses, [link.inertia for link in tree.links])
     eliminations = _eliminations(tree, poses, bodies)
@@ -288,11 +331,11 @@ def articulated_accelerations(
     base: Acceleration,
     external: Mapping[int, Wrench],
 ) -> SX:
-    """Return the joint accelerations (nv, 1) due to joint efforts: forward dynamics of the tree.
+    """Return the joint accelerations (nv, 1) due to joint efforts: forward dynamics of a tree.
 
-    The wrenches of the motion with zero joint accelerations are computed first. The efforts that
-    do not balance them accelerate the articulated bodies. Joint friction and springs of the tree
-    are not included.
+    The wrenches of the motion with zero joint accelerations are computed first. The efforts that do
+    not balance them accelerate the articulated bodies. Joint friction and springs of the tree are
+    not included.
 
     Args:
         tree: links, rotors included.
@@ -321,9 +364,15 @@ def articulated_accelerations(
 
 
 def inertia_pivots(tree: Tree, poses: list[LinkPose]) -> tuple[SX, SX]:
-    """Return two inertias (nv, 1) of each velocity: descendant joints free to move, and locked.
+    """Return two inertias (nv, 1) of each joint velocity, with free and with locked descendants.
 
-    If the first is negligible relative to the second, the inertia matrix is singular.
+    The first is the effort for a unit acceleration if the joints of descendants move freely, the
+    second if they are locked. If the first is negligible relative to the second, the inertia matrix
+    is singular.
+
+    Args:
+        tree: links, rotors included.
+        poses: pose of each link relative to its antecedent.
     """
     poses, bodies = shift_frames(tree, poses, [link.inertia for link in tree.links])
     rigid = regroup(tree, poses, bodies)
@@ -348,7 +397,10 @@ def _numbers(link: Link) -> range:
 def _eliminations(
     tree: Tree, poses: list[LinkPose], bodies: Sequence[Inertia]
 ) -> list[JointElimination]:
-    """Return the elimination of each joint, by link; computed from the leaves to the base."""
+    """Return the elimination of the velocities of each joint, by link.
+
+    `bodies` are the inertias of the links. Eliminations are computed from the leaves to the base.
+    """
     rigid = regroup(tree, poses, list(bodies))
     articulated = [ArticulatedInertia.of(body) for body in rigid]
     leaves = set(range(len(tree.links))) - {link.antecedent for link in tree.links}
@@ -376,7 +428,7 @@ def _eliminations(
 
 
 def _drive(tree: Tree, poses: list[LinkPose], j: int) -> RotorDrive:
-    """Return the drive inertia of joint j, in the frame of its link."""
+    """Return the inertia of the motor and rotor of joint j, in the frame of link j."""
     link = tree.links[j]
     if link.rotor is None:
         return RotorDrive(link.Ia, zeros())
@@ -417,12 +469,18 @@ def _solution(
 
 
 def _moved_wrench(steps: Sequence[Displacement], wrench: SX) -> SX:
-    """Transform a wrench (6, 1) from the frame after displacements to the frame before them."""
+    """Transform a wrench (6, 1) from the frame after displacements to the frame before them.
+
+    `steps` are the displacements, in order.
+    """
     return casadi.vertcat(*transform_wrench_along(steps, wrench[:3], wrench[3:]))
 
 
 def _moved_twist(steps: Sequence[Displacement], twist: SX) -> SX:
-    """Transform a twist (6, 1) from the frame before displacements to the frame after them."""
+    """Transform a twist (6, 1) from the frame before displacements to the frame after them.
+
+    `steps` are the displacements, in order.
+    """
     v, w = twist[:3], twist[3:]
     for step in steps:
         p = step.point(zeros())

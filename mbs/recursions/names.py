@@ -14,7 +14,15 @@ from mbs.recursions.newton_euler import Dynamics
 
 
 def newton_euler_names(dynamics: Dynamics) -> list[tuple[str, SX]]:
-    """Return the names and scalars of the Newton-Euler recursions."""
+    """Return pairs (SYMORO name, scalar) of the intermediate results of a Newton-Euler recursion.
+
+    Constants and single symbols are left out. The first letters of a name are W and WP (angular
+    velocity and acceleration), U (its matrix), VP (acceleration), F and NO (force and moment of the
+    link itself), E and N (force and moment that the joint transmits). Digits are element and link.
+
+    Args:
+        dynamics: results of `newton_euler`.
+    """
     named: list[tuple[str, SX]] = []
     for j, motion in enumerate(dynamics.motions, 1):
         own, joint = dynamics.own[j - 1], dynamics.wrenches[j - 1]
@@ -33,7 +41,10 @@ def newton_euler_names(dynamics: Dynamics) -> list[tuple[str, SX]]:
 
 
 def _elements(name: str, matrix: SX, link: int) -> list[tuple[str, SX]]:
-    """Return the elements of a matrix that are neither constant nor a single symbol."""
+    """Return pairs (name, element) of a matrix of link number `link`, counted from 1.
+
+    Constants and single symbols are left out.
+    """
     rows, columns = matrix.shape
     named = []
     for column in range(columns):

@@ -48,12 +48,12 @@ class LinkPose:
 
     @property
     def steps(self) -> tuple[Displacement, ...]:
-        """Displacements from frame i to frame j."""
+        """Displacements from frame i to frame j: `seat`, then `motion`."""
         return self.seat + self.motion
 
     @property
     def foot(self) -> SX:
-        """(3, 1) origin of the seat in frame i [m]."""
+        """(3, 1) origin of the joint frame on link i, in frame i [m]."""
         return origin(self.seat)
 
     @property
@@ -63,41 +63,53 @@ class LinkPose:
 
     @property
     def height(self) -> SX:
-        """Distance of the frame from its seat, along the axis of the joint [m]."""
+        """Distance from the joint frame on link i to frame j, along the axis of the joint [m]."""
         return origin(self.motion)[2]
 
     @property
     def matrix(self) -> SX:
-        """(3, 3) orientation of j in i."""
+        """(3, 3) orientation of frame j relative to frame i."""
         R = Pose.identity().R
         for step in self.steps:
             R = casadi.mtimes(R, step.rotation.matrix)
         return R
 
     def at_seat(self, vector: SX) -> SX:
-        """Express a vector of frame i in the axes of the seat."""
+        """Express a vector (3, 1) of frame i in the axes of the joint frame on link i."""
         for step in self.seat:
             vector = step.rotation.apply_inverse(vector)
         return vector
 
     def apply(self, vector: SX) -> SX:
-        """Express a vector of frame j in frame i."""
+        """Express a vector (3, 1) of frame j in the axes of frame i."""
         for step in reversed(self.steps):
             vector = step.rotation.apply(vector)
         return vector
 
     def apply_inverse(self, vector: SX) -> SX:
-        """Express a vector of frame i in frame j."""
+        """Express a vector (3, 1) of frame i in the axes of frame j."""
         for step in self.steps:
             vector = step.rotation.apply_inverse(vector)
         return vector
 
     def wrench(self, f: SX, m: SX) -> Wrench:
-        """Transform a wrench about the origin of j, in frame j, to the origin and axes of i."""
+        """Transform a wrench about the origin and in axes of frame j to frame i.
+
+        Args:
+            f: (3, 1) force [N].
+            m: (3, 1) moment [N m].
+
+        Returns:
+            force and moment about the origin and in axes of frame i.
+        """
         return transform_wrench_along(self.steps, f, m)
 
     def after(self, pose: Pose) -> Pose:
-        """Return the pose of frame j in the frame in which frame i has the pose `pose`."""
+        """Return the pose of frame j relative to a third frame.
+
+        Args:
+            pose: pose of frame i relative to the third frame.
+        """
         rows = pose.R.T
         for step in self.steps:
             rows = casadi.horzcat(*(step.rotation.apply_inverse(rows[:, k]) for k in range(3)))
@@ -105,7 +117,12 @@ class LinkPose:
 
 
 def link_poses(tree: Tree, q: SX) -> list[LinkPose]:
-    """Return the pose of each link relative to its antecedent at the positions q, (nq, 1)."""
+    """Return the pose of each link relative to its antecedent, by link.
+
+    Args:
+        tree: the links.
+        q: (nq, 1) joint positions [rad or m], and quaternions.
+    """
     poses: list[LinkPose] = []
     angles: list[SX] = []
     for j, link in enumerate(tree.links):
@@ -123,12 +140,17 @@ def link_poses(tree: Tree, q: SX) -> list[LinkPose]:
 
 
 def _continues(before: Link, seat: tuple[ScrewDisplacement, ...]) -> bool:
-    """Whether joint `before` is revolute and parallel to a revolute joint on this seat."""
+    """Return whether joint `before` is revolute and parallel to the axis at the end of `seat`."""
     return before.motion is Motion.REVOLUTE and not any(_turns(step) for step in seat)
 
 
 def base_poses(tree: Tree, poses: list[LinkPose]) -> list[Pose]:
-    """Return the pose of each link frame in the base frame."""
+    """Return the pose of each link frame in the base frame, by link.
+
+    Args:
+        tree: the links.
+        poses: pose of each link relative to its antecedent.
+    """
     result: list[Pose] = []
     for link, pose in zip(tree.links, poses, strict=True):
         i = link.antecedent
@@ -139,7 +161,10 @@ def base_poses(tree: Tree, poses: list[LinkPose]) -> list[Pose]:
 def _joint(
     link: Link, seat: tuple[ScrewDisplacement, ...], q: SX
 ) -> tuple[tuple[ScrewDisplacement, ...], tuple[Displacement, ...]]:
-    """Return the seat of a joint and the displacements from the seat to the link frame."""
+    """Return the displacements to the joint frame on the antecedent, and from there to the link.
+
+    `seat` are the displacements to the joint axis, and `q` is the position of the joint.
+    """
     at = link.placement
     match link.motion:
         case Motion.REVOLUTE:
@@ -150,7 +175,10 @@ def _joint(
 
 
 def _free(link: Link, q: SX) -> FreeDisplacement:
-    """Return the displacement of a spherical or free joint, inverted for a backward joint."""
+    """Return the displacement of a spherical or free joint at q.
+
+    Its inverse for a backward joint.
+    """
     R = quaternion_rotation(q[link.motion.nq - 4 :])
     R = R.T if link.backward else R
     if link.motion is not Motion.FREE:
@@ -161,10 +189,10 @@ def _free(link: Link, q: SX) -> FreeDisplacement:
 
 
 def _moving(*steps: ScrewDisplacement) -> tuple[ScrewDisplacement, ...]:
-    """Return the steps that are not the identity."""
+    """Return the steps that are not the constant identity."""
     return tuple(step for step in steps if _turns(step) or not step.t.is_zero())
 
 
 def _turns(step: ScrewDisplacement) -> bool:
-    """Whether a step rotates. A tiny angle has a cosine of one and a nonzero sine."""
+    """Return whether a step rotates. A tiny angle has a cosine of one and a nonzero sine."""
     return not (step.rotation.s.is_zero() and step.rotation.c.is_one())

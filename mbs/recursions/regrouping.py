@@ -48,9 +48,9 @@ def regroup(tree: Tree, poses: list[LinkPose], bodies: list[Body]) -> list[Body]
 
 
 def _parts(motion: Motion, body: Body) -> tuple[Body, Body]:
-    """Split a body of link j into the part that stays and the part regrouped to its antecedent.
+    """Split a body of link j into the part that stays and the part that is moved to its antecedent.
 
-    Both are in frame j.
+    Both are in frame j. `motion` is the type of joint j.
     """
     match motion:
         case Motion.REVOLUTE:
@@ -61,7 +61,7 @@ def _parts(motion: Motion, body: Body) -> tuple[Body, Body]:
 
 
 def _seen_through(body: Body, motion: Motion, pose: LinkPose) -> Body:
-    """Transform a regrouped part from frame j to frame i.
+    """Transform the moved part of a body from frame j to frame i of its antecedent.
 
     For a prismatic joint the part is a rotational inertia, which only needs a rotation.
     """
@@ -76,19 +76,19 @@ def _seen_through(body: Body, motion: Motion, pose: LinkPose) -> Body:
 
 
 def _join(body: Body, part: Body) -> Body:
-    """Sum of two bodies about the same point; cancelling numbers become exact zeros."""
+    """Return the sum of two bodies about the same point; numbers that cancel become exact zeros."""
     both = zip(_moments(body), _moments(part), strict=True)
     return type(body)(*(_sum(a, b) for a, b in both))
 
 
 def _sum(a: SX, b: SX) -> SX:
-    """Return a + b; numbers that cancel become structural zeros."""
+    """Return a + b for matrices of equal shape; numbers that cancel become exact zeros."""
     entries = (exact_sum(x, y) for x, y in zip(elements(a), elements(b), strict=True))
     return casadi.reshape(casadi.vertcat(*entries), *a.shape)
 
 
 def _moments(body: Body) -> tuple[SX, SX, SX]:
-    """Return the moments of a body of order 2, 1 and 0."""
+    """Return the three moments of a body: of order 2 (J or S), order 1 (ms) and order 0 (m)."""
     return body.J if isinstance(body, Inertia) else body.S, body.ms, body.m
 
 
@@ -105,7 +105,9 @@ def _moments(body: Body) -> tuple[SX, SX, SX]:
 def shift_frames(
     tree: Tree, poses: list[LinkPose], bodies: list[Body], *, base_rests: bool = True
 ) -> tuple[list[LinkPose], list[Body]]:
-    """Return poses and bodies after shifting frames of revolute links along their axes.
+    """Return poses and bodies after frames of revolute links were shifted along their axes.
+
+    Shifts make distances zero, which saves operations.
 
     Args:
         tree: links of the tree.
@@ -158,7 +160,10 @@ def _resting(tree: Tree, poses: list[LinkPose]) -> set[int]:
 
 
 def _between(tree: Tree, poses: list[LinkPose], rise: list[SX], j: int) -> LinkPose:
-    """Pose of link j relative to its antecedent after both frames have been shifted."""
+    """Return the pose of link j relative to its antecedent after both frames were shifted.
+
+    `rise` is the shift of each link frame along its joint axis [m].
+    """
     pose, i = poses[j], tree.links[j].antecedent
     b = -rise[i] if i >= 0 else SX(0)
     screw = pose.motion[0]

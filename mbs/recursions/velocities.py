@@ -23,10 +23,17 @@ from mbs.spatial import cross, formula, is_zero, origin, transform_wrench_along,
 
 
 def motion_at_joint(link: Link, v: SX) -> tuple[SX, SX]:
-    """Velocity (linear, angular) of link j relative to link i, in axes of constant direction.
+    """Return the velocity of link j relative to its antecedent i, in axes of constant direction.
 
-    The reference point and the axes belong to frame j or, for a backward motion, to the seat (joint
-    frame on link i).
+    The reference point and the axes belong to frame j or, for a backward joint, to the joint frame
+    on link i.
+
+    Args:
+        link: link j with its joint.
+        v: velocity of the joint, (nv, 1) for its nv velocities.
+
+    Returns:
+        linear and angular velocity, (3, 1) each.
     """
     match link.motion:
         case Motion.REVOLUTE:
@@ -45,7 +52,13 @@ def _along_z(v: SX) -> SX:
 
 
 def effort_at_joint(link: Link, f: SX, m: SX) -> SX:
-    """Project a wrench on the joint motion; the wrench is about and in the frame of the motion."""
+    """Return the joint effort of a wrench on link j.
+
+    Args:
+        link: link j with its joint.
+        f: (3, 1) force, in the axes of `motion_at_joint`.
+        m: (3, 1) moment about its reference point, in the same axes.
+    """
     match link.motion:
         case Motion.REVOLUTE:
             return m[2]
@@ -56,23 +69,44 @@ def effort_at_joint(link: Link, f: SX, m: SX) -> SX:
 
 
 def unit_motions_at_joint(link: Link) -> list[tuple[SX, SX]]:
-    """Linear and angular velocity for each unit joint velocity, as in `motion_at_joint`."""
+    """Return the (linear, angular) velocity of `motion_at_joint` for each unit joint velocity.
+
+    Args:
+        link: link j with its joint.
+    """
     identity = SX.eye(link.motion.nv)
     return [motion_at_joint(link, casadi.densify(identity[:, k])) for k in range(link.motion.nv)]
 
 
 def motion_behind(link: Link, pose: LinkPose, v: SX) -> tuple[SX, SX]:
-    """Linear and angular velocity of frame j relative to its seat, in the axes of frame j."""
+    """Return the velocity of link j relative to its antecedent, in the axes of frame j.
+
+    Args:
+        link: link j with its joint.
+        pose: pose of the link relative to its antecedent.
+        v: velocity of the joint, (nv, 1) for its nv velocities.
+
+    Returns:
+        linear velocity of the origin of frame j, and angular velocity, (3, 1) each.
+    """
     return _behind(link, pose, motion_at_joint(link, v))
 
 
 def unit_motions(link: Link, pose: LinkPose) -> list[tuple[SX, SX]]:
-    """Linear and angular velocity of frame j, in its axes, for each unit joint velocity."""
+    """Return the (linear, angular) velocity of `motion_behind` for each unit joint velocity.
+
+    Args:
+        link: link j with its joint.
+        pose: pose of the link relative to its antecedent.
+    """
     return [_behind(link, pose, unit) for unit in unit_motions_at_joint(link)]
 
 
 def _behind(link: Link, pose: LinkPose, velocity: tuple[SX, SX]) -> tuple[SX, SX]:
-    """Transform a result of `motion_at_joint` to the origin and axes of frame j."""
+    """Transform a velocity of `motion_at_joint` to the origin and axes of frame j.
+
+    `velocity` is (linear, angular); `pose` is the pose of `link` relative to its antecedent.
+    """
     if not link.backward:
         return velocity
     linear, angular = velocity
@@ -82,7 +116,14 @@ def _behind(link: Link, pose: LinkPose, velocity: tuple[SX, SX]) -> tuple[SX, SX
 
 
 def effort(link: Link, pose: LinkPose, f: SX, m: SX) -> SX:
-    """Project a force f and moment m about the origin of frame j on the joint motion."""
+    """Return the joint effort of a wrench on link j.
+
+    Args:
+        link: link j with its joint.
+        pose: pose of the link relative to its antecedent.
+        f: (3, 1) force, in axes of frame j [N].
+        m: (3, 1) moment about the origin of frame j, in its axes [N m].
+    """
     if link.backward:
         f, m = transform_wrench_along(pose.motion, f, m)
     return effort_at_joint(link, f, m)
@@ -143,12 +184,12 @@ class RotationRate:
 
 
 def rotation_rate(w: SX, wd: SX, across: SX | None = None) -> RotationRate:
-    """Return U with six products of angular velocities, or five if `across` is given.
+    """Return U = skew(wd) + skew(w) skew(w), with six products of angular velocities or five.
 
     Args:
         w: (3, 1) angular velocity.
         wd: (3, 1) angular acceleration.
-        across: x^2 + y^2 of w if it is already known; then y^2 needs no product.
+        across: w[0]^2 + w[1]^2 if it is already known, which saves a product.
     """
     if across is None or w[0].is_zero() or w[1].is_zero():
         U, *spread = _rotation_rate(w, wd, SX(0), False)
@@ -159,7 +200,10 @@ def rotation_rate(w: SX, wd: SX, across: SX | None = None) -> RotationRate:
 
 @formula((3, 1), (3, 1), (1, 1))
 def _rotation_rate(w: SX, wd: SX, across: SX, known: bool) -> tuple[SX, SX, SX, SX]:
-    """Return U = skew(wd) + skew(w) skew(w), and three differences of its squared terms."""
+    """Return U = skew(wd) + skew(w) skew(w), and the three differences `RotationRate.spread`.
+
+    `across` is w[0]^2 + w[1]^2 if `known`.
+    """
     x, y, z = w[0], w[1], w[2]
     xx, zz, xy, xz, yz = x * x, z * z, x * y, x * z, y * z
     xy_square = across if known else xx + y * y
@@ -174,7 +218,7 @@ def _rotation_rate(w: SX, wd: SX, across: SX, known: bool) -> tuple[SX, SX, SX, 
 
 
 def moment_of_rotation(S: SX, rate: RotationRate) -> SX:
-    """(3, 1) moment J wd + w x (J w), from the skew part of U S.
+    """Return the moment (3, 1) J wd + w x (J w), from the skew part of U S.
 
     Row x is (U S)_zy - (U S)_yz, the integral of y (U r)_z - z (U r)_y over the mass. It needs
     thirteen products if S[2, 2] is zero.
@@ -190,7 +234,11 @@ def moment_of_rotation(S: SX, rate: RotationRate) -> SX:
 
 @formula((3, 3), (3, 3), (1, 1), (1, 1), (1, 1))
 def _moment_of_rotation(S: SX, U: SX, s_x: SX, s_y: SX, s_z: SX, signs: tuple[int, ...]) -> SX:
-    """Return the moment (3, 1) of `moment_of_rotation` from S, U and the spread of U."""
+    """Return the moment (3, 1) of `moment_of_rotation` from S, U and the spread of U.
+
+    s_x, s_y and s_z are the spread. `signs` has the `_relation` of U[n, m] and U[m, n] for each
+    row.
+    """
     rows = []
     for k, spread in enumerate((s_x, s_y, s_z)):
         m, n = (k + 1) % 3, (k + 2) % 3
@@ -207,7 +255,7 @@ def _relation(a: SX, b: SX) -> int:
 
 
 def _difference(a: SX, first: SX, b: SX, second: SX, sign: int) -> SX:
-    """Return ``a * first - b * second``, with one product if a = b or a = -b."""
+    """Return ``a * first - b * second``, with one product if `sign` is 1 (a = -b) or -1 (a = b)."""
     if sign:
         return a * (first + second if sign > 0 else first - second)
     return a * first - b * second
@@ -236,7 +284,11 @@ class Acceleration:
 
 
 def resting_base(gravity: SX) -> Acceleration:
-    """Return the motion of a fixed base; gravity (3, 1) in its frame enters as vd = -gravity."""
+    """Return the motion of a fixed base, whose acceleration is minus gravity.
+
+    Args:
+        gravity: (3, 1) gravity acceleration, in the base frame [m/s^2].
+    """
     return moving_base(zeros(), zeros(), -gravity)
 
 
@@ -244,9 +296,9 @@ def moving_base(w: SX, wd: SX, vd: SX) -> Acceleration:
     """Return the motion of a moving base.
 
     Args:
-        w: (3, 1) angular velocity, in the base frame.
-        wd: (3, 1) angular acceleration, in the base frame.
-        vd: (3, 1) acceleration of the origin minus gravity, in the base frame.
+        w: (3, 1) angular velocity, in the base frame [rad/s].
+        wd: (3, 1) angular acceleration, in the base frame [rad/s^2].
+        vd: (3, 1) acceleration of the origin minus gravity, in the base frame [m/s^2].
     """
     return Acceleration(w, wd, rotation_rate(w, wd), vd)
 
@@ -254,7 +306,7 @@ def moving_base(w: SX, wd: SX, vd: SX) -> Acceleration:
 def link_accelerations(
     tree: Tree, poses: list[LinkPose], v: SX, a: SX, base: Acceleration
 ) -> list[Acceleration]:
-    """Return the acceleration of each link in its frame.
+    """Return the velocity and acceleration of each link in its frame.
 
     Args:
         tree: links of the tree.
@@ -280,7 +332,7 @@ def link_accelerations(
 def _rotation(
     tree: Tree, poses: list[LinkPose], j: int, v: SX, a: SX, motions: list[Acceleration]
 ) -> tuple[SX, SX, RotationRate]:
-    """Angular velocity, angular acceleration and rate U of link j.
+    """Return angular velocity, angular acceleration and rate U of link j.
 
     `motions` contains the previous links and, as its last element, the base.
     """
@@ -308,7 +360,7 @@ def _rotation(
 
 
 def _run(tree: Tree, poses: list[LinkPose], j: int, motions: list[Acceleration]) -> tuple[int, ...]:
-    """Indices of the joints whose summed angles rotate the angular velocity of link j.
+    """Return the joints whose summed angles rotate the angular velocity of link j.
 
     A run of parallel axes is joined if the angular velocity has a zero x or y component before the
     run, which a rotation at each joint would lose. Otherwise the run is joint j alone.
@@ -319,10 +371,10 @@ def _run(tree: Tree, poses: list[LinkPose], j: int, motions: list[Acceleration])
 
 
 def _square_across(before: Acceleration, pose: LinkPose) -> SX | None:
-    """Squared angular velocity normal to axis j, if an entry of U_i contains it, else None.
+    """Return the squared angular velocity normal to axis j if U of the antecedent i contains it.
 
     It is equal for both links of the joint. If axis j is parallel to coordinate axis k of frame i,
-    it is -U_i[k, k].
+    it is -U_i[k, k]. Otherwise return None.
     """
     axis = vector([0, 0, 1])
     for step in reversed(pose.seat):

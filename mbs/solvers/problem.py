@@ -114,7 +114,11 @@ class EventMotion:
 
 
 def fired_of(flags: npt.ArrayLike) -> tuple[int, ...]:
-    """Return the indices of the indicators whose flag is set."""
+    """Return the indices of the event indicators whose flag is not zero, in increasing order.
+
+    Args:
+        flags: (k,) flag of each event indicator.
+    """
     return tuple(np.flatnonzero(flags).tolist())
 
 
@@ -271,7 +275,10 @@ def equations(
 
 
 def _passage(given: Passage, txp: list[casadi.MX]) -> Passage:
-    """Return the functions with the names that the integrator requires; vectors become dense."""
+    """Return a passage with the function names that the integrator requires and dense vectors.
+
+    `txp` are the symbols of t, x and p.
+    """
 
     def vectors_dense(name: str, function: casadi.Function) -> casadi.Function:
         values = function.call(txp)
@@ -287,10 +294,12 @@ def _passage(given: Passage, txp: list[casadi.MX]) -> Passage:
 
 
 def _first(function: casadi.Function, inputs: list[casadi.MX]) -> casadi.MX:
+    """Return the first output of a function for the symbolic `inputs`."""
     return function(*inputs) if function.n_out() == 1 else function(*inputs)[0]
 
 
 def _dense(name: str, inputs: list[casadi.MX], *outputs: casadi.MX) -> casadi.Function:
+    """Return a Function with dense outputs, expanded to scalar operations if possible."""
     return _scalar(casadi.Function(name, inputs, [casadi.densify(value) for value in outputs]))
 
 
@@ -319,6 +328,10 @@ def _scalar(function: casadi.Function) -> casadi.Function:
 
 
 def _projection(project: casadi.Function, txp: list[casadi.MX]) -> casadi.Function:
+    """Return the projection as `mbs_project(t, x, p)`; raise ModelError if its sizes do not fit.
+
+    `txp` are the symbols of t, x and p.
+    """
     sizes = [symbol.numel() for symbol in txp]
     given = [project.numel_in(k) for k in range(project.n_in())]
     fits = len(given) in (2, 3) and given == sizes[: len(given)]
@@ -333,6 +346,10 @@ def _projection(project: casadi.Function, txp: list[casadi.MX]) -> casadi.Functi
 def _event_functions(
     events: Events, txp: list[casadi.MX], slope: casadi.MX
 ) -> tuple[casadi.Function, casadi.Function, casadi.Function, casadi.Function | None]:
+    """Return indicators, their rates, jump and approaches (or None) with inputs (t, x, p).
+
+    `txp` are the symbols of t, x and p, and `slope` is x'. Raise ModelError if sizes do not fit.
+    """
     t, x, p = txp
     indicators, jump, n_modes = events.indicators, events.jump, len(numbers(events.modes))
     sizes = [1, x.numel(), p.numel()]
@@ -432,7 +449,7 @@ def problem(
 
 
 def numbers(values: npt.ArrayLike) -> Array:
-    """Return values as a vector of floats.
+    """Return values of any shape as a vector (n,) of floats.
 
     Raises:
         ModelError: the values are not numeric.
@@ -490,15 +507,12 @@ _OF_LAW = re.compile(
 
 
 def failure_of(error: RuntimeError, reason: str) -> Failure:
-    """Return the failure of an evaluation that CasADi ended with an error.
+    """Return a `Failure` for an evaluation that CasADi ended with an error.
 
-    Args:
-        error: raised by CasADi.
-        reason: key of REASONS, if the evaluation has no value.
+    Raise if it must stop.
 
-    Raises:
-        KeyboardInterrupt: control-C was pressed during the evaluation.
-        LawFailure: a law that is a Callback raised an error.
+    Returns:
+        `Failure(reason)`, whose catcher shortens the step.
     """
     text = str(error)
     if text.rstrip().endswith("KeyboardInterrupt"):

@@ -189,7 +189,23 @@ class Limiter(SignalBlock):
 # Blocks with states, without limits.
 
 
-class Integrator(SignalBlock):
+class _FilterBlock(SignalBlock):
+    """Base of blocks with the input u and the output y = x, a state."""
+
+    x = custom.state()
+    u = custom.input()
+    y = custom.output()
+
+    def outputs(self, at: Any) -> Mapping[str, SX]:
+        """Return {"y": x}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
+        return {"y": at.x}
+
+
+class Integrator(_FilterBlock):
     """y = x, dx/dt = k u.
 
     Attributes:
@@ -197,9 +213,6 @@ class Integrator(SignalBlock):
     """
 
     k = custom.parameter("1/s", 1.0)
-    x = custom.state()
-    u = custom.input()
-    y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
         """Return {"x": k u}.
@@ -209,16 +222,8 @@ class Integrator(SignalBlock):
         """
         return {"x": at.k * at.u}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": x}.
 
-        Args:
-            at: values of the component and motion of its ports, see `custom.At`.
-        """
-        return {"y": at.x}
-
-
-class FirstOrder(SignalBlock):
+class FirstOrder(_FilterBlock):
     """A first-order filter: y = x, time dx/dt = k u - x.
 
     Attributes:
@@ -228,9 +233,6 @@ class FirstOrder(SignalBlock):
 
     time = custom.parameter("s", positive=True)
     k = custom.parameter("1", 1.0)
-    x = custom.state()
-    u = custom.input()
-    y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
         """Return {"x": (k u - x) / time}.
@@ -240,16 +242,8 @@ class FirstOrder(SignalBlock):
         """
         return {"x": (at.k * at.u - at.x) / at.time}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": x}.
 
-        Args:
-            at: values of the component and motion of its ports, see `custom.At`.
-        """
-        return {"y": at.x}
-
-
-class SecondOrder(SignalBlock):
+class SecondOrder(_FilterBlock):
     """A second-order filter: y = x, x'' + 2 damping w x' + w^2 x = w^2 k u.
 
     Attributes:
@@ -261,10 +255,7 @@ class SecondOrder(SignalBlock):
     w = custom.parameter("rad/s", positive=True)
     damping = custom.parameter("1", 1.0, min=0)
     k = custom.parameter("1", 1.0)
-    x = custom.state()
     v = custom.state("1/s")
-    u = custom.input()
-    y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
         """Return {"x": v, "v": w^2 (k u - x) - 2 damping w v}.
@@ -275,16 +266,8 @@ class SecondOrder(SignalBlock):
         pull = at.w**2 * (at.k * at.u - at.x)
         return {"x": at.v, "v": pull - 2 * at.damping * at.w * at.v}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": x}.
 
-        Args:
-            at: values of the component and motion of its ports, see `custom.At`.
-        """
-        return {"y": at.x}
-
-
-class RateLimiter(SignalBlock):
+class RateLimiter(_FilterBlock):
     """A signal that follows the input with a limited rate: y = x, dx/dt = (u - x) / time.
 
     The rate is limited to the range from `-falling` to `rising`. Below the limits y lags by `time`.
@@ -300,9 +283,6 @@ class RateLimiter(SignalBlock):
     time = custom.parameter("s", positive=True)
     falling = custom.parameter("1/s", None, positive=True)
     width = custom.parameter("1/s", 0.0, min=0)
-    x = custom.state()
-    u = custom.input()
-    y = custom.output()
 
     def rates(self, at: Any) -> Mapping[str, SX]:
         """Return {"x": (u - x) / time limited to the range from -falling to rising}.
@@ -312,14 +292,6 @@ class RateLimiter(SignalBlock):
         """
         down = at.rising if at.falling is None else at.falling
         return {"x": saturate((at.u - at.x) / at.time, -down, at.rising, at.width)}
-
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": x}.
-
-        Args:
-            at: values of the component and motion of its ports, see `custom.At`.
-        """
-        return {"y": at.x}
 
 
 # Controllers.

@@ -151,9 +151,6 @@ class JointForce(CoordinateForce):
 # Constant forces and torques on a body.
 
 
-_AXES = ("world", "body")
-
-
 @dataclass(frozen=True, slots=True)
 class PointSource(ForceElement):
     """Base of constant forces and torques on one point.
@@ -172,9 +169,9 @@ class PointSource(ForceElement):
     @property
     def follows(self) -> bool:
         """Whether the vector is constant in the axes of the point and rotates with the body."""
-        raise NotImplementedError
+        return getattr(self, "axes", "world") == "body"
 
-    def _settle(self, name: str) -> None:
+    def _take_vector(self, name: str) -> None:
         """Convert `point` to a Point and the field `name` to three expressions, in place.
 
         Raise DescriptionError if a value is invalid, all components are zero, or `axes` is unknown.
@@ -183,12 +180,7 @@ class PointSource(ForceElement):
         self._take_point("point")
         object.__setattr__(self, name, three(getattr(self, name), f"{self.name}, {name}"))
         self._require_effect(name)
-        axes = getattr(self, "axes", None)
-        if axes not in _AXES:
-            raise DescriptionError(
-                f"{self.name}: axes is {quoted(axes)}; use 'world', or 'body' for those of the"
-                " point, which rotate with it"
-            )
+        self._require_axes()
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,12 +197,7 @@ class Force(PointSource):
     axes: str = "world"
 
     def __post_init__(self) -> None:
-        self._settle("force")
-
-    @property
-    def follows(self) -> bool:
-        """Whether `axes` is "body": the force rotates with the body."""
-        return self.axes == "body"
+        self._take_vector("force")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
         """Return {"point": force ON the body at the origin of the point, in axes of the point} [N].
@@ -237,12 +224,7 @@ class Torque(PointSource):
     axes: str = "world"
 
     def __post_init__(self) -> None:
-        self._settle("torque")
-
-    @property
-    def follows(self) -> bool:
-        """Whether `axes` is "body": the torque rotates with the body."""
-        return self.axes == "body"
+        self._take_vector("torque")
 
     def loads(self, at: Any) -> Mapping[str, Load]:
         """Return {"point": torque ON the body, in axes of the point} [N m], without a reaction.

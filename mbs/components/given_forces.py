@@ -12,10 +12,6 @@ from casadi import SX
 from mbs.components import custom
 from mbs.components.custom import Custom, Load
 from mbs.components.drives import Device, TwoFlanges
-from mbs.errors import DescriptionError
-from mbs.text import quoted
-
-_AXES = ("world", "body")
 
 
 class _GivenOnPoint(Custom):
@@ -26,11 +22,7 @@ class _GivenOnPoint(Custom):
 
     def __post_init__(self) -> None:
         Custom.__post_init__(self)
-        if self.axes not in _AXES:
-            raise DescriptionError(
-                f"{self.name}: axes is {quoted(self.axes)}; use 'world', or 'body' for those of the"
-                " point, which rotate with it"
-            )
+        self._require_axes()
 
 
 class ForceInput(_GivenOnPoint):

@@ -245,7 +245,9 @@ def lock(mechanism: Description, positions: Mapping[str, Any]) -> None:
     for name, component in mechanism.components.items():
         if name in locks.gone or _acts_on(component, locks.values):
             continue
-        kept[name] = welds.get(name) or locks.changed.get(name) or _with_points(component, reattach)
+        if isinstance(component, OnPoints):
+            component = with_points(component, reattach)
+        kept[name] = welds.get(name) or locks.changed.get(name) or component
     mechanism.components = kept
     mechanism.connections = [(reattach(a), reattach(b)) for a, b in mechanism.connections]
     mechanism.frames = {name: reattach(point) for name, point in mechanism.frames.items()}
@@ -301,14 +303,6 @@ def _require_free_of_others(mechanism: Description, locks: _Locks) -> None:
                 f"{mechanism.name}: {component.name} reads the joint {component.joint}, which is"
                 " to be locked; take the sensor away first"
             )
-
-
-def _with_points(component: Component, reattach: Any) -> Component:
-    """Return a copy of a component with `reattach` applied to each of its points.
-
-    A component without points is returned unchanged.
-    """
-    return with_points(component, reattach) if isinstance(component, OnPoints) else component
 
 
 def _steps(mechanism: Description, name: str, values: Sequence[Expression]) -> tuple[Step, ...]:

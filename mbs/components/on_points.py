@@ -57,6 +57,16 @@ class OnPoints(Component):
             )
         return value
 
+    def _require_axes(
+        self,
+        allowed: tuple[str, ...] = ("world", "body"),
+        meaning: str = "'world', or 'body' for those of the point, which rotate with it",
+    ) -> None:
+        """Raise DescriptionError if the field `axes` is not allowed; `meaning` is the advice."""
+        axes = getattr(self, "axes", None)
+        if axes not in allowed:
+            raise DescriptionError(f"{self.name}: axes is {quoted(axes)}; use {meaning}")
+
 
 @dataclass(frozen=True, slots=True)
 class OnPair(OnPoints):

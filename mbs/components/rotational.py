@@ -76,37 +76,40 @@ class _SlippingShafts(_BetweenShafts):
         return SX(self._torque(at) * self._slip(at))
 
 
-class _BrakingTorque(OneFlange):
-    """Base of elements that brake one shaft and dissipate all the power."""
+class BrakingForce(OneFlange):
+    """Base of elements that brake one shaft or sliding part and dissipate all the power.
 
-    torque = custom.output("N.m")
+    A subclass declares one output: the braking torque or force.
+    """
 
     def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return {"flange": -T}: torque ON the shaft [N m], opposed to its speed.
+        """Return {"flange": -T}: torque or force ON the flange [N m or N], opposed to its speed.
 
         Args:
             at: values of the component and motion of its ports, see `custom.At`.
         """
-        return {"flange": -self._torque(at)}
+        return {"flange": -self._effort(at)}
 
     def dissipation(self, at: Any) -> SX:
-        """Return the braking torque times the speed of the shaft [W].
+        """Return the braking torque or force T times the speed of the flange [W].
 
         Args:
             at: values of the component and motion of its ports, see `custom.At`.
         """
-        return SX(self._torque(at) * at.flange.speed)
+        return SX(self._effort(at) * at.flange.speed)
 
     def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"torque": T [N m]}, with the sign of the speed. The shaft gets -T.
+        """Return the braking torque or force T [N m or N], by the name of the output.
+
+        It has the sign of the speed. The flange gets -T.
 
         Args:
             at: values of the component and motion of its ports, see `custom.At`.
         """
-        return {"torque": self._torque(at)}
+        return {self.output_names[0]: self._effort(at)}
 
-    def _torque(self, at: Any) -> SX:
-        """Return the braking torque [N m], with the sign of the speed of the shaft."""
+    def _effort(self, at: Any) -> SX:
+        """Return the braking torque or force T [N m or N], with the sign of the speed."""
         raise NotImplementedError
 
 
@@ -387,7 +390,7 @@ class LossyGear(TwoFlanges):
 # Loads, brakes and clutches.
 
 
-class QuadraticSpeedTorque(_BrakingTorque):
+class QuadraticSpeedTorque(BrakingForce):
     """Load of a fan, a propeller or a pump: torque -coefficient |w| w at the shaft speed w.
 
     Source: Modelica Association 2023.
@@ -397,14 +400,15 @@ class QuadraticSpeedTorque(_BrakingTorque):
     """
 
     coefficient = custom.parameter("N.m.s2/rad2", min=0)
+    torque = custom.output("N.m")
 
-    def _torque(self, at: Any) -> SX:
+    def _effort(self, at: Any) -> SX:
         """Return coefficient abs(w) w [N m] at the shaft speed w."""
         w = at.flange.speed
         return SX(at.coefficient * casadi.fabs(w) * w)
 
 
-class Brake(_BrakingTorque):
+class Brake(BrakingForce):
     """A brake between a shaft and the housing: torque -capacity engagement tanh(w / width).
 
     The input `engagement` is the fraction of the normal force, from 0 for a released brake
@@ -421,8 +425,9 @@ class Brake(_BrakingTorque):
     capacity = custom.parameter("N.m", min=0)
     width = custom.parameter("rad/s", _CREEP, positive=True)
     engagement = custom.input()
+    torque = custom.output("N.m")
 
-    def _torque(self, at: Any) -> SX:
+    def _effort(self, at: Any) -> SX:
         """Return the smooth friction torque of the brake [N m], with the sign of the speed."""
         return friction_of(at, at.flange.speed)
 
@@ -508,7 +513,7 @@ class RigidBrake(OneFlange):
     engagement = custom.input()
 
     def frictions(self, at: Any) -> Mapping[str, Friction]:
-        """Return {"": Friction} whose slip is the speed of the shaft [rad/s].
+        """Return {"": Friction} whose slip is the speed of the flange [rad/s or m/s].
 
         Its limit is capacity times max(engagement, 0).
 

@@ -73,12 +73,6 @@ class Sensor(OnPoints):
         """
         raise NotImplementedError
 
-    def _check_axes(self, allowed: tuple[str, ...], meaning: str) -> None:
-        """Raise DescriptionError if the field `axes` is not allowed; `meaning` is the advice."""
-        axes = getattr(self, "axes", None)
-        if axes not in allowed:
-            raise DescriptionError(f"{self.name}: axes is {quoted(axes)}; use {meaning}")
-
 
 @dataclass(frozen=True, slots=True)
 class MotionSensor(Sensor):
@@ -134,9 +128,7 @@ class AbsoluteSensor(MotionSensor):
     def __post_init__(self) -> None:
         Component.__post_init__(self)
         self._take_point("point")
-        self._check_axes(
-            ("world", "body"), "'world', or 'body' for those of the point, which rotate with it"
-        )
+        self._require_axes()
         self._check_quantities()
 
     @property
@@ -165,7 +157,7 @@ class RelativeSensor(OnPair, MotionSensor):
 
     def __post_init__(self) -> None:
         OnPair.__post_init__(self)
-        self._check_axes(("a", "b", "world"), "'a', 'b' or 'world'")
+        self._require_axes(("a", "b", "world"), "'a', 'b' or 'world'")
         self._check_quantities()
 
 
@@ -253,7 +245,7 @@ class WrenchSensor(OnJoint):
 
     def __post_init__(self) -> None:
         OnJoint.__post_init__(self)
-        self._check_axes(("a", "b", "world"), "'a', 'b' or 'world'")
+        self._require_axes(("a", "b", "world"), "'a', 'b' or 'world'")
 
     @property
     def measured(self) -> tuple[Quantity, ...]:

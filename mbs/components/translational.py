@@ -13,10 +13,10 @@ from typing import Any
 from casadi import SX
 
 from mbs.components import custom
-from mbs.components.custom import Friction, Load
-from mbs.components.drives import OneFlange, RigidPart, TwoFlanges
+from mbs.components.custom import Load
+from mbs.components.drives import RigidPart, TwoFlanges
 from mbs.components.forces import one_sided_damping, smooth_ramp
-from mbs.components.rotational import capacity_of, friction_of
+from mbs.components.rotational import BrakingForce, RigidBrake, friction_of
 from mbs.expressions import Expression, expression
 
 _TOUCH = 1e-4
@@ -207,7 +207,7 @@ class ElastoGap(_BetweenSlides):
         return smooth_ramp(at.length - self._extent(at), at.width)
 
 
-class SlidingBrake(OneFlange):
+class SlidingBrake(BrakingForce):
     """A brake between a sliding part and its rail: force -capacity engagement tanh(v / width).
 
     The input `engagement` is the fraction of the normal force, from 0 for a released brake
@@ -227,36 +227,12 @@ class SlidingBrake(OneFlange):
     engagement = custom.input()
     force = custom.output("N")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return {"flange": -F}: force ON the part [N], opposed to its speed.
-
-        Args:
-            at: values of the component and motion of its ports, see `custom.At`.
-        """
-        return {"flange": -self._force(at)}
-
-    def dissipation(self, at: Any) -> SX:
-        """Return the braking force times the speed of the part [W].
-
-        Args:
-            at: values of the component and motion of its ports, see `custom.At`.
-        """
-        return SX(self._force(at) * at.flange.speed)
-
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"force": F [N]}, with the sign of the speed. The part gets -F.
-
-        Args:
-            at: values of the component and motion of its ports, see `custom.At`.
-        """
-        return {"force": self._force(at)}
-
-    def _force(self, at: Any) -> SX:
-        """Return the braking force F [N], with the sign of the speed."""
+    def _effort(self, at: Any) -> SX:
+        """Return the smooth friction force of the brake [N], with the sign of the speed."""
         return friction_of(at, at.flange.speed)
 
 
-class RigidSlidingBrake(OneFlange):
+class RigidSlidingBrake(RigidBrake):
     """A brake with sticking between a sliding part and its rail, as a `RigidBrake` on a shaft.
 
     Source: Pfeiffer and Glocker 1996, chapter 5.
@@ -268,15 +244,3 @@ class RigidSlidingBrake(OneFlange):
 
     flange = custom.flange(slides=True)
     capacity = custom.parameter("N", min=0)
-    sticking = custom.parameter("1", 1.0, min=1)
-    engagement = custom.input()
-
-    def frictions(self, at: Any) -> Mapping[str, Friction]:
-        """Return {"": Friction} whose slip is the speed of the part [m/s].
-
-        Its limit is capacity times max(engagement, 0).
-
-        Args:
-            at: values of the component and motion of its ports, see `custom.At`.
-        """
-        return {"": capacity_of(at, at.flange.speed)}

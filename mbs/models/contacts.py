@@ -636,7 +636,9 @@ def switched_dynamics(system: System, driven: tuple[int, ...]) -> Function:
         # diagonal element of the mass matrix
         least = SX(1e-6 * inertia_size(system, A, s))
         own = [
-            _row_inertia(A, rows[j, :]) / contacts.sizes[j] ** 2 if n is None else A[n, n]
+            A[n, n]
+            if n is not None
+            else casadi.mtimes(rows[j, :], casadi.mtimes(A, rows[j, :].T)) / contacts.sizes[j] ** 2
             for j, n in enumerate(contacts.velocities)
         ]
         inertia = casadi.vertcat(*(casadi.fmax(x, least) for x in own))
@@ -644,11 +646,6 @@ def switched_dynamics(system: System, driven: tuple[int, ...]) -> Function:
         return inputs, [("a", a), ("tau_p", tau_p / every), ("inertia", inertia)]
 
     return model_function(system, ("switched_dynamics", driven), build)
-
-
-def _row_inertia(A: SX, row: SX) -> SX:
-    """Return the effective inertia row A row' along a row (1, nv) of about unit norm."""
-    return SX(casadi.mtimes(row, casadi.mtimes(A, row.T)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,6 +17,7 @@ from mbs.operations.polynomials import (
     Monomial,
     Pair,
     Polynomial,
+    Writer,
     angle,
     extract_pairs,
     improved,
@@ -28,7 +29,7 @@ from mbs.operations.polynomials import (
 # Trigonometric functions of sums of angles instead of products of sines and cosines.
 
 
-class _Meeting(NamedTuple):
+class _AnglePair(NamedTuple):
     """Term with sines or cosines of two angles: factor `first` and factor `second`."""
 
     monomial: Monomial
@@ -56,12 +57,12 @@ def _join_angles(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polyno
     Return `polynomial` itself if no terms match.
     """
     opened = multiplied_out(algebra, polynomial, pair)
-    meetings: dict[Monomial, dict[tuple[int, int], _Meeting]] = {}
+    meetings: dict[Monomial, dict[tuple[int, int], _AnglePair]] = {}
     nodes = algebra.builder.nodes
     for monomial, coefficient in opened.items():
-        for first, second in _of_both(algebra, monomial, pair):
+        for first, second in _factor_pairs(algebra, monomial, pair):
             ops = nodes[first].op, nodes[second].op
-            meeting = _Meeting(monomial, coefficient, first, second)
+            meeting = _AnglePair(monomial, coefficient, first, second)
             meetings.setdefault(without(monomial, first, second), {})[ops] = meeting
     result = dict(opened)
     for rest, found in meetings.items():
@@ -73,7 +74,7 @@ def _join_angles(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polyno
     return polynomial if result == opened else result
 
 
-def _of_both(algebra: Algebra, monomial: Monomial, pair: Pair) -> Iterator[tuple[int, int]]:
+def _factor_pairs(algebra: Algebra, monomial: Monomial, pair: Pair) -> Iterator[tuple[int, int]]:
     """Yield pairs of factors: a sine or cosine of the first angle and one of the second."""
     known = {n: name for n in monomial if (name := angle(algebra, n)) in pair}
     for first, a in known.items():
@@ -83,7 +84,7 @@ def _of_both(algebra: Algebra, monomial: Monomial, pair: Pair) -> Iterator[tuple
 
 
 def _join(
-    algebra: Algebra, result: Polynomial, rest: Monomial, one: _Meeting, other: _Meeting
+    algebra: Algebra, result: Polynomial, rest: Monomial, one: _AnglePair, other: _AnglePair
 ) -> None:
     """Replace two terms of the polynomial `result`, in place, by the cosine or sine of a sum.
 
@@ -124,24 +125,13 @@ def factor(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
         parameters: names of the inputs that are constant from call to call.
     """
     names = tuple(parameters)
-    trials = (rewritten(graph, names, write) for write in (_opened_first, _opened_last))
+    # among equally cheap forms: the form with expanded products, or the form without
+    writers: tuple[Writer, ...] = (
+        lambda algebra, polynomial: algebra.cheapest(reversed(_forms(algebra, polynomial))),
+        lambda algebra, polynomial: algebra.cheapest(_forms(algebra, polynomial)),
+    )
+    trials = (rewritten(graph, names, write) for write in writers)
     return min(trials, key=lambda trial: count_graph(trial, names).total)
-
-
-def _opened_first(algebra: Algebra, polynomial: Polynomial) -> int:
-    """Write the cheapest factored form of a polynomial; return the node.
-
-    Among equally cheap forms, the form with expanded products is written.
-    """
-    return algebra.cheapest(reversed(_forms(algebra, polynomial)))
-
-
-def _opened_last(algebra: Algebra, polynomial: Polynomial) -> int:
-    """Write the cheapest factored form of a polynomial; return the node.
-
-    Among equally cheap forms, the form without expanded products is written.
-    """
-    return algebra.cheapest(_forms(algebra, polynomial))
 
 
 def _forms(algebra: Algebra, polynomial: Polynomial) -> list[partial[int]]:
@@ -301,7 +291,7 @@ def order(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
         parameters: names of inputs, not used.
     """
     graph = drop(graph)
-    room = _room(graph)
+    room = _registers(graph)
     deep = _depth(graph)
     ranks: list[_Rank] = [
         lambda number: (-room[number], number),
@@ -333,7 +323,7 @@ def waiting(graph: Graph) -> int:
     return most
 
 
-def _room(graph: Graph) -> list[int]:
+def _registers(graph: Graph) -> list[int]:
     """Return the Sethi-Ullman number of each node: registers it needs if no node were shared."""
     room: list[int] = []
     for number, node in enumerate(graph.nodes):
@@ -397,12 +387,12 @@ def parameters(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
 
 def _gather(algebra: Algebra, polynomial: Polynomial) -> int:
     """Write the cheaper form of a polynomial, with or without expanded sums; return the node."""
-    opened = _opened_parameters(algebra, polynomial)
+    opened = _expanded_sums(algebra, polynomial)
     forms = [polynomial] if opened == polynomial else [polynomial, opened]
     return algebra.cheapest([partial(algebra.plain, form) for form in forms])
 
 
-def _opened_parameters(algebra: Algebra, polynomial: Polynomial) -> Polynomial:
+def _expanded_sums(algebra: Algebra, polynomial: Polynomial) -> Polynomial:
     """Expand the terms of a polynomial that are sums and have a monomial in common with it."""
     total = dict(polynomial)
     for monomial, coefficient in polynomial.items():
@@ -507,7 +497,7 @@ def _associate(graph: Graph, parameters: tuple[str, ...], ops: set[int], longest
         longest: largest number of elements of a group that is expanded although it has other uses.
     """
     fixed = graph.fixed_by(parameters)
-    groups = _opened_groups(graph, ops, fixed, longest)
+    groups = _merged_groups(graph, ops, fixed, longest)
     known: dict[int, Group] = {}
     for group in groups.values():
         _gather_fixed(group, fixed, known, len(graph.nodes))
@@ -516,7 +506,7 @@ def _associate(graph: Graph, parameters: tuple[str, ...], ops: set[int], longest
     return _write(graph, {**groups, **known}, Builder(graph, parameters), ops)
 
 
-def _opened_groups(
+def _merged_groups(
     graph: Graph, ops: set[int], fixed: list[bool], longest: int
 ) -> dict[int, Group]:
     """Return the terms of each sum, or the factors of each product, by node index.

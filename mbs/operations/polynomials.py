@@ -292,13 +292,13 @@ class _Rewriting:
         if not first or not second:
             return {}
         for one, other in ((first, second), (second, first)):
-            if _is_coefficient(one) and self._bears(other):
+            if _is_coefficient(one) and self._scales_by_terms(other):
                 other = self._algebra.opened(other) if len(other) == 1 else other
                 return self._algebra.scaled(other, one[()])
         (m1, c1), (m2, c2) = self._single(first), self._single(second)
         return {tuple(sorted(m1 + m2)): self._builder.product(c1, c2)}
 
-    def _bears(self, form: Polynomial) -> bool:
+    def _scales_by_terms(self, form: Polynomial) -> bool:
         """Return whether scaling each term of a polynomial costs no more than scaling its sum."""
         units = sum(1 for m, c in form.items() if m and self._algebra.is_unit(c))
         return units <= 1
@@ -507,16 +507,18 @@ def _name(algebra: Algebra, number: int) -> str:
     """Return a text of the expression that a node computes; empty if it is nested too deeply."""
     known = algebra.names.get(number)
     if known is None:
-        known = algebra.names[number] = _spelt(algebra, number, _DEEPEST_NAME)
+        known = algebra.names[number] = _expression_text(algebra, number, _DEEPEST_NAME)
     return known
 
 
-def _spelt(algebra: Algebra, number: int, depth: int) -> str:
+def _expression_text(algebra: Algebra, number: int, depth: int) -> str:
     """Return a text of the expression that a node computes; empty if nested deeper than `depth`."""
     node = algebra.builder.nodes[number]
     if node.op in (casadi.OP_INPUT, casadi.OP_CONST):
         return f"{node.op} {node.args} {node.value}"
-    parts = [_spelt(algebra, operand, depth - 1) for operand in node.args] if depth else [""]
+    parts = (
+        [_expression_text(algebra, operand, depth - 1) for operand in node.args] if depth else [""]
+    )
     if node.op != casadi.OP_SUB:
         parts.sort()
     return f"({node.op} {' '.join(parts)})" if all(parts) else ""
@@ -582,13 +584,13 @@ class _Extraction:
         for holder in list(self._holders.pop(pair)):
             group = self._groups[holder]
             outer = group[a]
-            self._forget(holder, group, a, b)
+            self._remove_pairs(holder, group, a, b)
             del group[a], group[b]
-            self._notice(holder, group, name, outer)
+            self._record_pairs(holder, group, name, outer)
             group[name] = outer
         self._groups[name] = {a: 1, b: sign}
 
-    def _forget(self, holder: int, group: Group, a: int, b: int) -> None:
+    def _remove_pairs(self, holder: int, group: Group, a: int, b: int) -> None:
         """Remove the pairs of elements a or b with the other elements of the group `holder`."""
         for other, sign in group.items():
             for gone in (a, b):
@@ -598,7 +600,7 @@ class _Extraction:
                     if holders is not None:
                         holders.pop(holder, None)
 
-    def _notice(self, holder: int, group: Group, name: int, outer: int) -> None:
+    def _record_pairs(self, holder: int, group: Group, name: int, outer: int) -> None:
         """Record the pairs of the new element `name` with the elements of the group `holder`.
 
         `outer` is the sign of the new element.

@@ -11,7 +11,6 @@ import casadi
 from casadi import SX
 
 from mbs.assembly.tree import Tree
-from mbs.components.joints import Motion
 from mbs.recursions.newton_euler import momentum_on
 from mbs.recursions.poses import LinkPose
 from mbs.recursions.regrouping import regroup, shift_frames
@@ -42,7 +41,9 @@ def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
             steps = pose.steps
         for column, (linear, angular) in enumerate(unit_motions(link, pose)):
             f, m = body.momentum(linear, angular)
-            spin = _at_seat(pose, link.motion, momentum_on(link, j))
+            spin = momentum_on(link, j)
+            if link.motion.nv == 1:
+                spin = pose.motion[0].rotation.apply(spin)
             m = m + spin
             A[link.v, link.v.start + column] = effort(link, pose, f, m)
             f_i, m_i = transform_wrench_along(steps, f, m)
@@ -55,14 +56,6 @@ def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
         if link.antecedent >= 0:
             composite[link.antecedent] += transform_inertia_along(steps, body)
     return A
-
-
-def _at_seat(pose: LinkPose, motion: Motion, vector: SX) -> SX:
-    """Return a vector (3, 1) of the link frame in the axes in which its joint momentum is computed.
-
-    They are the axes of the joint frame on the antecedent for a joint with one velocity.
-    """
-    return pose.motion[0].rotation.apply(vector) if motion.nv == 1 else vector
 
 
 def _fill_ancestors(

@@ -223,7 +223,7 @@ def join_rotations(steps: Sequence[PathStep], tree: Tree) -> list[PathStep]:
                 rotations.append(step)
             case PathTranslation(p=p):
                 result.append(PathTranslation(_total(rotations).apply(p)))
-            case JointAt(link=k) if _along_z(tree.links[k]):
+            case JointAt(link=k) if tree.links[k].motion in (Motion.REVOLUTE, Motion.PRISMATIC):
                 result.append(step)
             case OriginOf():
                 result.append(step)
@@ -231,11 +231,6 @@ def join_rotations(steps: Sequence[PathStep], tree: Tree) -> list[PathStep]:
                 result += [*_one_rotation(rotations), step]
                 rotations = []
     return result + _one_rotation(rotations)
-
-
-def _along_z(link: Link) -> bool:
-    """Return whether the joint of a link is revolute or prismatic: it moves about or along z."""
-    return link.motion in (Motion.REVOLUTE, Motion.PRISMATIC)
 
 
 def _one_rotation(rotations: list[RotationAboutZ]) -> list[PathStep]:

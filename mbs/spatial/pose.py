@@ -83,7 +83,7 @@ class Pose:
         chain = _join(self, other) if self.chain or other.chain else ()
         for one, rest in ((self, other), (other, self)):
             if one.is_identity():
-                return Pose(_with_lone_ones(_own(rest.R)), _own(rest.p), chain)
+                return Pose(_with_lone_ones(_dense_copy(rest.R)), _dense_copy(rest.p), chain)
         return Pose(
             _with_lone_ones(exact_product(self.R, other.R)),
             exact_product(self.R, other.p, self.p),
@@ -96,7 +96,12 @@ class Pose:
         return Pose(
             R,
             zeros() if self.p.is_zero() else exact_product(-R, self.p),
-            tuple(_inverse(step) for step in reversed(self.chain)),
+            tuple(
+                SymbolicRotation(step.axis, -step.angle)
+                if isinstance(step, SymbolicRotation)
+                else step.inverse()
+                for step in reversed(self.chain)
+            ),
         )
 
     @property
@@ -121,7 +126,7 @@ class Pose:
         return self.p.is_zero() and SX.binary(casadi.OP_SUB, self.R, _EYE).is_zero()
 
 
-def _own(value: SX) -> SX:
+def _dense_copy(value: SX) -> SX:
     """Return a dense copy of a matrix, so that changes in place do not affect the argument."""
     return +value if value.is_dense() else casadi.densify(value)
 
@@ -150,18 +155,9 @@ def _join(first: Pose, second: Pose) -> tuple[SymbolicRotation | Pose, ...]:
     return tuple(joined)
 
 
-def _inverse(step: SymbolicRotation | Pose) -> SymbolicRotation | Pose:
-    """Return the inverse of one factor of a pose."""
-    return (
-        SymbolicRotation(step.axis, -step.angle)
-        if isinstance(step, SymbolicRotation)
-        else step.inverse()
-    )
-
-
 def _with_lone_ones(R: SX) -> SX:
     """Set a constant of a rotation R that is alone in its row or column to 1 or -1, in place."""
-    if R.is_constant() and not _has_alone(numbers(R)):
+    if R.is_constant() and not _has_lone_constant(numbers(R)):
         return R
     entries = elements(R)
     for place, entry in enumerate(entries):
@@ -175,7 +171,7 @@ def _with_lone_ones(R: SX) -> SX:
     return R
 
 
-def _has_alone(elements: list[float]) -> bool:
+def _has_lone_constant(elements: list[float]) -> bool:
     """Return whether a row or column has a single nonzero element that is not 1 or -1.
 
     `elements` are its nine numbers, column by column.

@@ -105,7 +105,7 @@ class AxisRotation:
         Args:
             tensor: (3, 3) symmetric tensor.
         """
-        return _rotate_square(tensor, self.s, self.c, self.axis, self._block, True)
+        return _rotate_square(tensor, self.s, self.c, self.axis, self._angle_case, True)
 
     def apply_to_square(self, square: SX) -> SX:
         """Transform a general tensor (3, 3) from the rotated to the fixed frame.
@@ -115,10 +115,10 @@ class AxisRotation:
         Args:
             square: (3, 3) tensor, not necessarily symmetric.
         """
-        return _rotate_square(square, self.s, self.c, self.axis, self._block, False)
+        return _rotate_square(square, self.s, self.c, self.axis, self._angle_case, False)
 
     @property
-    def _block(self) -> str:
+    def _angle_case(self) -> str:
         """Case of the angle in `_rotate_square`.
 
         "quarter" for +-90 degrees, "still" for 0 or 180 degrees, else "any".
@@ -155,7 +155,7 @@ def _rotate_vector(vector: SX, s: SX, c: SX, axis: str) -> SX:
 def _rotate_square(square: SX, s: SX, c: SX, axis: str, block: str, symmetric: bool) -> SX:
     """Return R T R' for a tensor T (3, 3), `square`, and a rotation R about "x", "y" or "z".
 
-    s and c are sine and cosine of the angle, `block` is its case (see `AxisRotation._block`), and
+    s and c are sine and cosine of the angle, `block` is its `AxisRotation._angle_case`, and
     `symmetric` is whether T is symmetric. With w = c (a - e) - s (b + d), the block [[a, b], [d,
     e]] of the two rotating axes becomes [[e + c w, b + s w], [d + s w, a - c w]].
     """
@@ -197,11 +197,11 @@ class MatrixRotation:
 
     def apply_to_square(self, square: SX) -> SX:
         """Transform a general tensor `square` (3, 3) from the rotated frame to the fixed frame."""
-        return _turned_by_matrix(square, self.matrix)
+        return _rotate_by_matrix(square, self.matrix)
 
 
 @formula((3, 3), (3, 3))
-def _turned_by_matrix(square: SX, R: SX) -> SX:
+def _rotate_by_matrix(square: SX, R: SX) -> SX:
     """Return R T R' for a tensor T (3, 3), `square`."""
     return casadi.mtimes(casadi.mtimes(R, square), R.T)
 

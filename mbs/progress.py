@@ -51,7 +51,7 @@ def progress(
     bar = _DelayedBar(label, start, stop, shown=not quiet and sys.stderr.isatty())
     listener = _LISTENER.get()
     try:
-        yield bar.reach if listener is None else _told(bar, listener)
+        yield bar.reach if listener is None else _with_listener(bar, listener)
     finally:
         bar.close()
 
@@ -102,7 +102,7 @@ class _DelayedBar:
         self._bar.start()
 
 
-def _told(bar: _DelayedBar, listener: Listener) -> Callable[[float], None]:
+def _with_listener(bar: _DelayedBar, listener: Listener) -> Callable[[float], None]:
     """Return a function of the reached value that updates the bar and calls the listener."""
 
     def reach(simulated: float) -> None:

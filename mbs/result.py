@@ -223,9 +223,11 @@ class Result:
             raise ModelError(f"result {self.name!r}: t [s] is {quoted(t)}; give the time of a row")
         if t is not None:
             row = int(np.searchsorted(self.time, float(t), side="right")) - 1
-            near = min((k for k in (row, row + 1) if 0 <= k < len(self.time)), key=self._far(t))
+            near = min(
+                (k for k in (row, row + 1) if 0 <= k < len(self.time)), key=self._distance_from(t)
+            )
             # times are sums of steps, with rounding errors
-            if self._far(t)(near) > 1e-9 * max(1.0, abs(float(t))):
+            if self._distance_from(t)(near) > 1e-9 * max(1.0, abs(float(t))):
                 raise ModelError(
                     f"result {self.name!r}: there is no row at {float(t)!r} s, the nearest is at"
                     f" {float(self.time[near])!r} s; take this one, or give run another step"
@@ -233,7 +235,7 @@ class Result:
             row = int(np.flatnonzero(self.time == self.time[near])[-1])
         return self.states.at(row, float(self.time[row]), self.name)
 
-    def _far(self, t: float) -> Callable[[int], float]:
+    def _distance_from(self, t: float) -> Callable[[int], float]:
         """Return a function from a row index to the distance [s] of its time from t."""
         return lambda row: abs(float(self.time[row]) - float(t))
 

@@ -16,7 +16,7 @@ from casadi import SX
 
 from mbs.components import custom
 from mbs.components.component import Component
-from mbs.components.custom import Custom, Event
+from mbs.components.custom import At, Custom, Event
 from mbs.errors import DescriptionError
 from mbs.expressions import expression, to_float, to_sx
 from mbs.text import quoted
@@ -28,13 +28,13 @@ class SignalBlock(Custom):
 
     def _require_order(self) -> None:
         """Raise DescriptionError if `low` and `high` are both numbers and low is not below high."""
-        below, above = (self._number(name) for name in ("low", "high"))
+        below, above = (self._parameter_value(name) for name in ("low", "high"))
         if below is not None and above is not None and below >= above:
             raise DescriptionError(
                 f"{self.name}: low is {below:g} and high is {above:g}; give them in order"
             )
 
-    def _number(self, name: str) -> float | None:
+    def _parameter_value(self, name: str) -> float | None:
         """Return the numeric value of the parameter `name`; None if it is symbolic or left out."""
         given = getattr(self, name)
         return None if given is None else to_float(given)
@@ -76,7 +76,7 @@ class Constant(SignalBlock):
     value = custom.parameter()
     y = custom.output()
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"y": value}.
 
         Args:
@@ -96,7 +96,7 @@ class Gain(SignalBlock):
     u = custom.input()
     y = custom.output()
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"y": k u}.
 
         Args:
@@ -141,7 +141,7 @@ class Sum(SignalBlock):
         """Names of the used inputs: the first of u1 .. u4, one per weight."""
         return ("u1", "u2", "u3", "u4")[: len(self.weights)]
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"y": sum of weight times input}.
 
         Args:
@@ -177,7 +177,7 @@ class Limiter(SignalBlock):
             )
         self._require_order()
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"y": u limited to the range from low to high}.
 
         Args:
@@ -196,7 +196,7 @@ class _FilterBlock(SignalBlock):
     u = custom.input()
     y = custom.output()
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"y": x}.
 
         Args:
@@ -214,7 +214,7 @@ class Integrator(_FilterBlock):
 
     k = custom.parameter("1/s", 1.0)
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return {"x": k u}.
 
         Args:
@@ -234,7 +234,7 @@ class FirstOrder(_FilterBlock):
     time = custom.parameter("s", positive=True)
     k = custom.parameter("1", 1.0)
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return {"x": (k u - x) / time}.
 
         Args:
@@ -257,7 +257,7 @@ class SecondOrder(_FilterBlock):
     k = custom.parameter("1", 1.0)
     v = custom.state("1/s")
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return {"x": v, "v": w^2 (k u - x) - 2 damping w v}.
 
         Args:
@@ -284,7 +284,7 @@ class RateLimiter(_FilterBlock):
     falling = custom.parameter("1/s", None, positive=True)
     width = custom.parameter("1/s", 0.0, min=0)
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return {"x": (u - x) / time limited to the range from -falling to rising}.
 
         Args:
@@ -326,7 +326,7 @@ class ErrorController(SignalBlock):
 
     def _require_ratio(self) -> None:
         """Raise DescriptionError if the default of `tracking`, kp / ki, is not a positive time."""
-        found = {name: self._number(name) for name in ("kp", "ki")}
+        found = {name: self._parameter_value(name) for name in ("kp", "ki")}
         known = {name: gain for name, gain in found.items() if gain is not None}
         if 0 in known.values() or (len(known) == 2 and known["kp"] * known["ki"] < 0):
             gains = " and ".join(f"{name} is {gain:g}" for name, gain in known.items())
@@ -335,7 +335,7 @@ class ErrorController(SignalBlock):
                 " the limits; give tracking"
             )
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return {"x": ki e, plus (u - u0) / tracking if the output has limits}.
 
         u is the limited output and u0 the output before the limits.
@@ -349,7 +349,7 @@ class ErrorController(SignalBlock):
             rate += (self._saturate(at) - self._command(at)) / tracking
         return {"x": rate}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"u": output, limited to the range from low to high}.
 
         Args:
@@ -357,11 +357,11 @@ class ErrorController(SignalBlock):
         """
         return {"u": self._saturate(at)}
 
-    def _saturate(self, at: Any) -> SX:
+    def _saturate(self, at: At) -> SX:
         """Return the output limited to the range from low to high."""
         return saturate(self._command(at), at.low, at.high, SX(0))
 
-    def _command(self, at: Any) -> SX:
+    def _command(self, at: At) -> SX:
         """Return u0, the output before the limits."""
         raise NotImplementedError
 
@@ -383,7 +383,7 @@ class PI(ErrorController):
     tracking = custom.parameter("s", None, positive=True)
     x = custom.state()
 
-    def _command(self, at: Any) -> SX:
+    def _command(self, at: At) -> SX:
         """Return kp e + x, the output before the limits."""
         return SX(at.kp * (at.target - at.measured) + at.x)
 
@@ -412,7 +412,7 @@ class PID(ErrorController):
     x = custom.state()
     f = custom.state()
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return the rates of the integral part "x" and of the filtered error "f".
 
         Args:
@@ -421,7 +421,7 @@ class PID(ErrorController):
         error = at.target - at.measured
         return {**ErrorController.rates(self, at), "f": (error - at.f) / at.filter}
 
-    def _command(self, at: Any) -> SX:
+    def _command(self, at: At) -> SX:
         """Return kp e + x + kd (e - f) / filter, the output before the limits."""
         error = at.target - at.measured
         return SX(at.kp * error + at.x + at.kd * (error - at.f) / at.filter)
@@ -435,7 +435,7 @@ class SampledBlock(SignalBlock):
 
     left = custom.state("s")
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return {"left": -1}: the time to the next sample decreases by one second per second.
 
         Args:
@@ -443,7 +443,7 @@ class SampledBlock(SignalBlock):
         """
         return {"left": SX(-1)}
 
-    def events(self, at: Any) -> Mapping[str, Event]:
+    def events(self, at: At) -> Mapping[str, Event]:
         """Return the event "samples" at left = 0, which resets `left` and sets sampled modes.
 
         Args:
@@ -451,7 +451,7 @@ class SampledBlock(SignalBlock):
         """
         return {"samples": Event(at.left, {"left": at.period, **self._sample(at)})}
 
-    def _sample(self, at: Any) -> Mapping[str, SX]:
+    def _sample(self, at: At) -> Mapping[str, SX]:
         """Return the new value of each mode at a sampling instant, by name."""
         raise NotImplementedError
 
@@ -468,11 +468,11 @@ class SampleHold(SampledBlock):
     y = custom.output()
     sample = custom.mode()
 
-    def _sample(self, at: Any) -> Mapping[str, SX]:
+    def _sample(self, at: At) -> Mapping[str, SX]:
         """Return {"sample": u}."""
         return {"sample": at.u}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"y": u at the last sampling instant}.
 
         Args:
@@ -514,7 +514,7 @@ class SampledPID(SampledBlock):
         Custom.__post_init__(self)
         self._require_order()
 
-    def _sample(self, at: Any) -> Mapping[str, SX]:
+    def _sample(self, at: At) -> Mapping[str, SX]:
         """Return the output "sample", integral part "x" and error "error" at a sampling instant."""
         error = at.target - at.measured
         more = at.x + at.ki * error * at.period
@@ -526,7 +526,7 @@ class SampledPID(SampledBlock):
         x = casadi.if_else(outwards, at.x, more)
         return {"sample": saturate(given + x, at.low, at.high, SX(0)), "x": x, "error": error}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"u": output computed at the last sampling instant, within the limits}.
 
         Args:

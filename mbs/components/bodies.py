@@ -345,7 +345,7 @@ class KhalilBody(RigidBody):
         self._normalise(*TEN_PARAMETERS)
         if not self.grouped:
             check_mass(self.name, self.M)
-            six, scale = self._about_com()
+            six, scale = self._inertia_about_com()
             check_tensor(
                 self.name,
                 six,
@@ -359,9 +359,9 @@ class KhalilBody(RigidBody):
 
         Empty if there is no fault, or for grouped values.
         """
-        return "" if self.grouped else tensor_fault(*self._about_com())
+        return "" if self.grouped else tensor_fault(*self._inertia_about_com())
 
-    def _about_com(self) -> tuple[list[Scalar], float]:
+    def _inertia_about_com(self) -> tuple[list[Scalar], float]:
         """Return the inertia about the centre of mass, and the magnitude of its terms [kg m^2].
 
         The inertia is Ixx Ixy Ixz Iyy Iyz Izz, empty if a parameter has no value or the mass is
@@ -504,7 +504,7 @@ class Box(_Bar):
         Component.__post_init__(self)
         if self.height is None:
             object.__setattr__(self, "height", self.width)
-        self._normalise(*_given(self, "length", "width", "height", "density", "mass"))
+        self._normalise(*_given_fields(self, "length", "width", "height", "density", "mass"))
         self._check_solid(("length", "width", "height"))
         check_mass(self.name, self.solid_mass)
 
@@ -544,7 +544,7 @@ class Cylinder(_Bar):
 
     def __post_init__(self) -> None:
         Component.__post_init__(self)
-        self._normalise(*_given(self, "length", "radius", "inner_radius", "density", "mass"))
+        self._normalise(*_given_fields(self, "length", "radius", "inner_radius", "density", "mass"))
         self._check_solid(("length", "radius"))
         inner, outer = to_float(self.inner_radius), to_float(self.radius)
         if inner is not None and (inner < 0 or (outer is not None and inner >= outer)):
@@ -570,6 +570,6 @@ class Cylinder(_Bar):
         return self._solid_inertia(symbols, self.solid_mass, [squares / 2, across, across])
 
 
-def _given(component: Component, *names: str) -> list[str]:
+def _given_fields(component: Component, *names: str) -> list[str]:
     """Return the names of fields of a component that are not None."""
     return [name for name in names if getattr(component, name) is not None]

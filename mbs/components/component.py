@@ -410,10 +410,10 @@ def check_arguments(cls: type) -> None:
     own = vars(cls).get("__init__")
     if own is None or hasattr(own, "__wrapped__"):
         return
-    setattr(cls, "__init__", _checking(own))  # noqa: B010
+    setattr(cls, "__init__", _with_checked_arguments(own))  # noqa: B010
 
 
-def _checking(init: Callable[..., None]) -> Callable[..., None]:
+def _with_checked_arguments(init: Callable[..., None]) -> Callable[..., None]:
     """Return a constructor that calls `init` and raises ArgumentError for wrong arguments."""
 
     @wraps(init)
@@ -510,11 +510,13 @@ class Component:
         Args:
             prefix: text before the names, without the dot.
         """
-        return self._change(lambda value: renamed(value, prefix), f"{prefix}.{self.name}")
+        return self._with_changed_fields(
+            lambda value: renamed(value, prefix), f"{prefix}.{self.name}"
+        )
 
     def without_defaults(self: C) -> C:
         """Return a copy whose symbolic parameters have no default values."""
-        return self._change(without_defaults, self.name)
+        return self._with_changed_fields(without_defaults, self.name)
 
     def check_values(self: C, values: Mapping[str, float]) -> C:
         """Return the component with numbers for its parameters, checked as in the constructor.
@@ -525,9 +527,9 @@ class Component:
         Raises:
             DescriptionError: the constructor raises it for these values.
         """
-        return self._change(lambda value: with_values(value, values), self.name)
+        return self._with_changed_fields(lambda value: with_values(value, values), self.name)
 
-    def _change(self: C, change: Callable[[Expression], Expression], name: str) -> C:
+    def _with_changed_fields(self: C, change: Callable[[Expression], Expression], name: str) -> C:
         """Return a copy with the name `name` and with `change` applied to each scalar field."""
         fresh: dict[str, Any] = {
             f.name: _map(getattr(self, f.name), change) for f in fields(self) if f.init

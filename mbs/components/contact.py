@@ -18,7 +18,7 @@ from casadi import SX, Function
 
 from mbs.components import custom
 from mbs.components.bodies import three
-from mbs.components.custom import Approach, Load, RelativeMotion
+from mbs.components.custom import Approach, At, Load, RelativeMotion
 from mbs.components.forces import ForceElement
 from mbs.components.shapes import Shape
 from mbs.errors import DescriptionError
@@ -224,7 +224,7 @@ class Contact(ForceElement):
         asked = [name for name in methods if not (name == "dissipation" and self.has_bristles)]
         return custom.Custom.has(self, *asked)
 
-    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+    def spots(self, motion: RelativeMotion, at: At) -> list[Spot]:
         """Return the contact point of each entry of `labels`, also without contact (depth < 0).
 
         Args:
@@ -235,7 +235,7 @@ class Contact(ForceElement):
 
     # Equations.
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the wrenches ON the body and ON the ground, by frame name of `ports`.
 
         Each is in axes of its own frame, about its own origin [N, N m]. The ground gets the
@@ -255,7 +255,7 @@ class Contact(ForceElement):
             on_ground -= cross(motion.p + touch.spot.lever, own)
         return custom.between(ground, body, custom.FrameLoad(-force, on_ground), on_body)
 
-    def energy(self, at: Any) -> SX:
+    def energy(self, at: At) -> SX:
         """Return the elastic energy [J], zero without contact.
 
         It is the sum of k d^(n + 1) / (n + 1) over the contact points with d > 0.
@@ -267,7 +267,7 @@ class Contact(ForceElement):
         spots = self.spots(self._motion(at), at)
         return sum((k * _power(spot.depth, n + 1) / (n + 1) for spot in spots), SX(0))
 
-    def dissipation(self, at: Any) -> SX:
+    def dissipation(self, at: At) -> SX:
         """Return the power dissipated by normal damping and regularised friction [W].
 
         It is zero without contact, and undefined for friction with bristles (see `has`).
@@ -283,7 +283,7 @@ class Contact(ForceElement):
             SX(0),
         )
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return the rate [m/s] of each bristle state bristle_AXIS + label.
 
         Empty without bristles.
@@ -299,7 +299,7 @@ class Contact(ForceElement):
             for axis in self.axes
         }
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return four outputs of each contact point, whose names end with its label.
 
         normal_force and friction_force are magnitudes [N], zero without contact. depth [m] is
@@ -319,7 +319,7 @@ class Contact(ForceElement):
             found |= {name + label: value for name, value in zip(_OUTPUTS, values, strict=True)}
         return found
 
-    def crossings(self, at: Any) -> Mapping[str, SX | Approach]:
+    def crossings(self, at: At) -> Mapping[str, SX | Approach]:
         """Return an event indicator "depth" + label of each contact point: its depth [m].
 
         Contact begins and ends at its zero. An offset of 1e-9 m counts touching shapes as in
@@ -334,7 +334,7 @@ class Contact(ForceElement):
             for label, spot in zip(self.labels, self.spots(motion, at), strict=True)
         }
 
-    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+    def approach(self, motion: RelativeMotion, spot: Spot, at: At) -> tuple[SX | None, SX]:
         """Return speed [m/s] and pace [1/s] of the depth of a contact point, see `custom.Approach`.
 
         The speed bounds the speed of all points of the body. The obstacle size is the distance of
@@ -351,19 +351,19 @@ class Contact(ForceElement):
 
     # Helpers.
 
-    def _motion(self, at: Any) -> RelativeMotion:
+    def _motion(self, at: At) -> RelativeMotion:
         """Return the motion of the body's frame in the ground's frame, in axes of the ground."""
         body, ground = (getattr(at, port) for port in self.ports)
         found: RelativeMotion = ground.to(body)
         return found
 
-    def _touches(self, at: Any) -> list[_Touch]:
+    def _touches(self, at: At) -> list[_Touch]:
         """Return forces and velocities at each contact point, in the order of `labels`."""
         motion = self._motion(at)
         spots = self.spots(motion, at)
         return [self._touch(at, motion, *pair) for pair in zip(self.labels, spots, strict=True)]
 
-    def _touch(self, at: Any, motion: RelativeMotion, label: str, spot: Spot) -> _Touch:
+    def _touch(self, at: At, motion: RelativeMotion, label: str, spot: Spot) -> _Touch:
         """Return forces and velocities at the contact point `spot`, in axes of the ground.
 
         `motion` is the motion of the body's frame in the ground's frame, and `label` the suffix of
@@ -389,7 +389,7 @@ class Contact(ForceElement):
             friction, bend = -limit * slip / casadi.sqrt(casadi.dot(slip, slip) + width**2), zeros()
         return _Touch(normal, elastic, along, rate, slip, friction, bend, spot)
 
-    def _bristles(self, at: Any, label: str, spot: Spot, slip: SX, limit: SX) -> tuple[SX, SX]:
+    def _bristles(self, at: At, label: str, spot: Spot, slip: SX, limit: SX) -> tuple[SX, SX]:
         """Return the friction on the body (3, 1) [N], and the rates of the bristles (3, 1) [m/s].
 
         With w the deflection as a fraction of its limit, w' = (v - s(w) abs(v) w) / bristle. s
@@ -429,12 +429,14 @@ def damping_for(restitution: float, impact_speed: float) -> float:
     # the function is positive below the root and negative above, and the root is within the bounds
     low, high = 0.75 * (1 - e**2) / (1 + e**3), 1 / e
     while low < (middle := 0.5 * (low + high)) < high:
-        value = _bend(middle) - _bend(-e * middle) if e * middle < 1 else -math.inf
+        value = (
+            _log_remainder(middle) - _log_remainder(-e * middle) if e * middle < 1 else -math.inf
+        )
         low, high = (middle, high) if value > 0 else (low, middle)
     return 0.0 if e == 1 else low / impact_speed
 
 
-def _bend(x: float) -> float:
+def _log_remainder(x: float) -> float:
     """Return x - ln(1 + x), accurate to rounding errors for small x."""
     if abs(x) > 0.1:  # x - log loses at most two digits; the series needs 18 terms
         return x - math.log1p(x)
@@ -466,7 +468,7 @@ class PlaneContact(Contact):
     body = custom.frame()
     plane = custom.frame()
 
-    def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
+    def centres(self, motion: RelativeMotion, at: At) -> list[SX]:
         """Return the (3, 1) centres of the spheres, in the frame of the body [m].
 
         Args:
@@ -475,7 +477,7 @@ class PlaneContact(Contact):
         """
         return [zeros()]
 
-    def reach(self, at: Any) -> SX:
+    def reach(self, at: At) -> SX:
         """Return the radius of the spheres [m]; zero for points.
 
         Args:
@@ -483,7 +485,7 @@ class PlaneContact(Contact):
         """
         return SX(0)
 
-    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+    def approach(self, motion: RelativeMotion, spot: Spot, at: At) -> tuple[SX | None, SX]:
         """Return a bound of the speed of the body [m/s], and its angular speed as the pace [1/s].
 
         A plane has no size: a depth can fall and rise again only if the body rotates. See
@@ -498,7 +500,7 @@ class PlaneContact(Contact):
         turn = custom.regular_length(motion.w)
         return custom.regular_length(motion.V) + reach * turn, turn
 
-    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+    def spots(self, motion: RelativeMotion, at: At) -> list[Spot]:
         """Return the lowest point of each sphere, with the vertical normal z of the plane.
 
         Args:
@@ -526,7 +528,7 @@ class SpherePlaneContact(PlaneContact):
 
     radius = custom.parameter("m", 0.0, min=0)
 
-    def reach(self, at: Any) -> SX:
+    def reach(self, at: At) -> SX:
         """Return the radius of the sphere [m].
 
         Args:
@@ -558,7 +560,7 @@ class CapsulePlaneContact(PlaneContact):
     radius = custom.parameter("m", positive=True)
     length = custom.parameter("m", positive=True)
 
-    def reach(self, at: Any) -> SX:
+    def reach(self, at: At) -> SX:
         """Return the radius of the end spheres [m].
 
         Args:
@@ -566,7 +568,7 @@ class CapsulePlaneContact(PlaneContact):
         """
         return SX(at.radius)
 
-    def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
+    def centres(self, motion: RelativeMotion, at: At) -> list[SX]:
         """Return the centres (3, 1) [m] of the end spheres a (z < 0) and b (z > 0), in `body`.
 
         Args:
@@ -601,7 +603,7 @@ class WheelPlaneContact(PlaneContact):
     radius = custom.parameter("m", positive=True)
     rim = custom.parameter("m", 0.0, min=0)
 
-    def reach(self, at: Any) -> SX:
+    def reach(self, at: At) -> SX:
         """Return the radius of the rounding of the rim [m].
 
         Args:
@@ -609,7 +611,7 @@ class WheelPlaneContact(PlaneContact):
         """
         return SX(at.rim)
 
-    def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
+    def centres(self, motion: RelativeMotion, at: At) -> list[SX]:
         """Return the lowest point (3, 1) of the centre circle of the rim in the frame `body` [m].
 
         It moves along the circle while the wheel rotates.
@@ -649,7 +651,7 @@ class BoxPlaneContact(PlaneContact):
         _take_size(self)
         Contact.__post_init__(self)
 
-    def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
+    def centres(self, motion: RelativeMotion, at: At) -> list[SX]:
         """Return the corners 1 to 8, (3, 1) each, in the frame `body` [m].
 
         Corner 1 has negative x, y and z. From corner to corner x changes sign first, then y, then
@@ -698,12 +700,12 @@ def _cuboid(port: str, size: Any, at: Any) -> Mapping[str, Shape]:
     return {port: Shape("box", known)} if len(known) == len(sides) else {}
 
 
-def _within(value: SX, half: SX) -> SX:
+def _clamped(value: SX, half: SX) -> SX:
     """Return `value` (1, 1) limited to the range from -half to half."""
     return casadi.fmin(casadi.fmax(value, -half), half)
 
 
-def _half_size(box: Any, at: Any) -> SX:
+def _half_size(box: Any, at: At) -> SX:
     """Return half the sides of a box along x, y, z, (3, 1) [m], at the parameters in `at`."""
     return vector(to_sx(side, at.symbols) for side in box.size) / 2
 
@@ -726,7 +728,7 @@ class SphereSphereContact(Contact):
     radius_a = custom.parameter("m", positive=True)
     radius_b = custom.parameter("m", positive=True)
 
-    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+    def spots(self, motion: RelativeMotion, at: At) -> list[Spot]:
         """Return the contact point on the line of centres, midway between both surfaces.
 
         The depth is radius_a + radius_b less the distance of the centres. The normal points from a
@@ -739,7 +741,7 @@ class SphereSphereContact(Contact):
         depth = at.radius_a + at.radius_b - motion.length
         return [Spot(depth, motion.along, -(at.radius_b - depth / 2) * motion.along)]
 
-    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+    def approach(self, motion: RelativeMotion, spot: Spot, at: At) -> tuple[SX | None, SX]:
         """Return the relative speed of the centres [m/s], and it over the sum of radii [1/s].
 
         Args:
@@ -778,7 +780,7 @@ class SphereCapsuleContact(Contact):
     capsule_radius = custom.parameter("m", positive=True)
     length = custom.parameter("m", positive=True)
 
-    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+    def spots(self, motion: RelativeMotion, at: At) -> list[Spot]:
         """Return the contact point, midway between both surfaces.
 
         The normal points from the nearest point of the capsule axis to the centre of the sphere.
@@ -787,13 +789,13 @@ class SphereCapsuleContact(Contact):
             motion: motion of the body's frame relative to the ground's frame.
             at: values of the component and motion of its ports, see `custom.At`.
         """
-        along = _within(motion.p[2], at.length / 2)
+        along = _clamped(motion.p[2], at.length / 2)
         off = motion.p - vector([SX(0), SX(0), along])
         distance = custom.regular_length(off)
         depth = at.radius + at.capsule_radius - distance
         return [Spot(depth, off / distance, -(at.radius - depth / 2) * off / distance)]
 
-    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+    def approach(self, motion: RelativeMotion, spot: Spot, at: At) -> tuple[SX | None, SX]:
         """Return the speed of the sphere centre in the capsule frame [m/s], and a pace [1/s].
 
         The pace is this speed divided by the sum of the radii.
@@ -841,7 +843,7 @@ class CapsuleCapsuleContact(Contact):
     radius_b = custom.parameter("m", positive=True)
     length_b = custom.parameter("m", positive=True)
 
-    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+    def spots(self, motion: RelativeMotion, at: At) -> list[Spot]:
         """Return the contact point, midway between both surfaces at the nearest points of the axes.
 
         The normal points from the nearest point of axis a to that of axis b.
@@ -855,9 +857,9 @@ class CapsuleCapsuleContact(Contact):
         own, other = motion.p[2], casadi.dot(motion.p, axis)
         half_a, half_b = at.length_a / 2, at.length_b / 2
         # minimum of a convex function of s and t within the lengths
-        s = _within((weight * own - cosine * other) / (weight**2 - cosine**2), half_a)
-        t = _within((cosine * s - other) / weight, half_b)
-        s = _within((own + cosine * t) / weight, half_a)
+        s = _clamped((weight * own - cosine * other) / (weight**2 - cosine**2), half_a)
+        t = _clamped((cosine * s - other) / weight, half_b)
+        s = _clamped((own + cosine * t) / weight, half_a)
         off = motion.p + t * axis - vector([SX(0), SX(0), s])
         length = custom.regular_length(off)
         distance = casadi.sqrt(length**2 + _PARALLEL * (s**2 + t**2))
@@ -865,7 +867,7 @@ class CapsuleCapsuleContact(Contact):
         lever = t * axis - (at.radius_b - depth / 2) * normal
         return [Spot(depth, normal, lever, length / distance)]
 
-    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+    def approach(self, motion: RelativeMotion, spot: Spot, at: At) -> tuple[SX | None, SX]:
         """Return a bound of the speed of the axis points of b in frame a [m/s], and a pace [1/s].
 
         The pace is this speed divided by the sum of the radii.
@@ -914,7 +916,7 @@ class SphereBoxContact(Contact):
         _take_size(self)
         Contact.__post_init__(self)
 
-    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+    def spots(self, motion: RelativeMotion, at: At) -> list[Spot]:
         """Return the contact point, midway between box and sphere surface at the nearest point.
 
         The normal points from the box to the centre of the sphere. If the centre is inside the box,
@@ -938,7 +940,7 @@ class SphereBoxContact(Contact):
         depth = at.radius - casadi.if_else(is_outside, distance, nearest)
         return [Spot(depth, normal, -(at.radius - depth / 2) * normal)]
 
-    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+    def approach(self, motion: RelativeMotion, spot: Spot, at: At) -> tuple[SX | None, SX]:
         """Return the speed of the sphere centre in the box frame [m/s], and a pace [1/s].
 
         The pace is this speed divided by the radius plus half the shortest side.
@@ -1019,7 +1021,7 @@ class HeightFieldContact(Contact):
                 " numbers"
             )
 
-    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+    def approach(self, motion: RelativeMotion, spot: Spot, at: At) -> tuple[SX | None, SX]:
         """Return None, since bumps leave the speed of the depth unbounded, and the pace [1/s].
 
         The pace is the speed of the centre in the frame `ground` divided by `spacing`.
@@ -1042,7 +1044,7 @@ class HeightFieldContact(Contact):
         """
         return _ball("body", at.radius)
 
-    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+    def spots(self, motion: RelativeMotion, at: At) -> list[Spot]:
         """Return the contact point on the line through the centre along the gradient of the depth.
 
         The normal is the negative unit gradient. The slope is the length of the gradient.

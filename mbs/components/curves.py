@@ -14,7 +14,7 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from mbs.components import custom
-from mbs.components.custom import Custom, Row
+from mbs.components.custom import At, Custom, Row
 from mbs.components.splines import Spline, natural_spline, periodic_spline
 from mbs.errors import DescriptionError
 from mbs.text import quoted
@@ -26,7 +26,7 @@ points with different rounding, through which a spline would have an arbitrary d
 Rows = tuple[tuple[float, ...], ...]
 
 
-def _rows_of(name: str, what: str, given: Any, columns: int, least: int, example: str) -> Rows:
+def _table_rows(name: str, what: str, given: Any, columns: int, least: int, example: str) -> Rows:
     """Return a table of numbers as rows; raise DescriptionError if it is invalid.
 
     The table `given` needs `columns` numbers per row and at least `least` rows. `name`, `what` and
@@ -79,7 +79,7 @@ class PointOnCurve(Custom):
     def __post_init__(self) -> None:
         Custom.__post_init__(self)
         least = 3 if self.closed else 2
-        rows = _rows_of(self.name, "curve", self.curve, 3, least, "[(0, 0, 0), (1, 0.2, 0)]")
+        rows = _table_rows(self.name, "curve", self.curve, 3, least, "[(0, 0, 0), (1, 0.2, 0)]")
         object.__setattr__(self, "curve", rows)
         distances = self._distances()
         near = [k for k, d in enumerate(distances) if d <= _APART * max(distances)]
@@ -89,7 +89,7 @@ class PointOnCurve(Custom):
                 " once, and the first one of a closed curve not again at its end"
             )
 
-    def rows(self, at: Any) -> Mapping[str, Row | SX]:
+    def rows(self, at: At) -> Mapping[str, Row | SX]:
         """Return rows "x", "y", "z": position of the pin minus the curve point c(s) [m].
 
         Both are vectors in axes of `ground`.
@@ -100,7 +100,7 @@ class PointOnCurve(Custom):
         off = at.ground.to(at.pin).p - self.spline.at(at.s)
         return dict(zip("xyz", casadi.vertsplit(off), strict=True))
 
-    def crossings(self, at: Any) -> Mapping[str, SX]:
+    def crossings(self, at: At) -> Mapping[str, SX]:
         """Return {"knots": event indicator}, which changes sign at each knot of the spline.
 
         Args:
@@ -108,7 +108,7 @@ class PointOnCurve(Custom):
         """
         return {"knots": self.spline.bend(at.s)}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return force_x, force_y, force_z: constraint force ON the pin, in axes of ground [N].
 
         The body of `ground` gets the reaction, which is not part of the outputs.
@@ -166,7 +166,9 @@ class Cam(Custom):
     def __post_init__(self) -> None:
         Custom.__post_init__(self)
         least = 2 if self.period is None else 3
-        rows = _rows_of(self.name, "profile", self.profile, 2, least, "[(0, 0), (2, 0.01), (4, 0)]")
+        rows = _table_rows(
+            self.name, "profile", self.profile, 2, least, "[(0, 0), (2, 0.01), (4, 0)]"
+        )
         object.__setattr__(self, "profile", rows)
         period = self.period
         if period is not None and not (isinstance(period, (int, float)) and 0 < period < math.inf):
@@ -188,7 +190,7 @@ class Cam(Custom):
                 f" {period:g}; leave the row out that repeats the first one"
             )
 
-    def rows(self, at: Any) -> Mapping[str, Row | SX]:
+    def rows(self, at: At) -> Mapping[str, Row | SX]:
         """Return {"lift": driven minus lift(driver) [m or rad]}.
 
         Args:
@@ -197,7 +199,7 @@ class Cam(Custom):
         lift = self.spline.at(at.driver.q)
         return {"lift": Row(at.driven.q - lift, "m" if at.driven.unit == "m" else "1")}
 
-    def crossings(self, at: Any) -> Mapping[str, SX]:
+    def crossings(self, at: At) -> Mapping[str, SX]:
         """Return {"knots": event indicator}, which changes sign at each knot of the lift.
 
         Args:
@@ -205,7 +207,7 @@ class Cam(Custom):
         """
         return {"knots": self.spline.bend(at.driver.q)}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"effort": constraint effort ON the driven coordinate [N or N m]}.
 
         It is negative if a follower that is only pressed on would leave the cam.

@@ -801,7 +801,7 @@ class Custom(OnPoints):
 
     # Equations of the component.
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the loads that the component exerts ON its ports, by port.
 
         A load is a `FrameLoad` on a frame, or an effort along a coordinate or flange [N or N m].
@@ -812,7 +812,7 @@ class Custom(OnPoints):
         """
         return {}
 
-    def energy(self, at: Any) -> SX:
+    def energy(self, at: At) -> SX:
         """Return the stored energy (1, 1) [J], zero by default.
 
         Args:
@@ -820,7 +820,7 @@ class Custom(OnPoints):
         """
         return SX(0)
 
-    def dissipation(self, at: Any) -> SX:
+    def dissipation(self, at: At) -> SX:
         """Return the dissipated power (1, 1) [W], zero by default.
 
         Args:
@@ -828,7 +828,7 @@ class Custom(OnPoints):
         """
         return SX(0)
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return the time derivative of each state, by state name.
 
         Args:
@@ -836,7 +836,7 @@ class Custom(OnPoints):
         """
         return {}
 
-    def rows(self, at: Any) -> Mapping[str, Row | SX]:
+    def rows(self, at: At) -> Mapping[str, Row | SX]:
         """Return position constraints by label: values that must be zero, in m or as a `Row`.
 
         They depend on positions, unknowns and parameters.
@@ -846,7 +846,7 @@ class Custom(OnPoints):
         """
         return {}
 
-    def positive(self, at: Any) -> Mapping[str, SX]:
+    def positive(self, at: At) -> Mapping[str, SX]:
         """Return expressions by label that are positive at the intended configurations only.
 
         Args:
@@ -854,7 +854,7 @@ class Custom(OnPoints):
         """
         return {}
 
-    def velocity_rows(self, at: Any) -> Mapping[str, Row | SX]:
+    def velocity_rows(self, at: At) -> Mapping[str, Row | SX]:
         """Return velocity constraints by label: values, linear in velocities, that must be zero.
 
         Args:
@@ -862,7 +862,7 @@ class Custom(OnPoints):
         """
         return {}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return the value of each output, by output name.
 
         Args:
@@ -870,7 +870,7 @@ class Custom(OnPoints):
         """
         return {}
 
-    def events(self, at: Any) -> Mapping[str, Event]:
+    def events(self, at: At) -> Mapping[str, Event]:
         """Return the events by label, each with an indicator and new values of states or modes.
 
         They depend on positions, velocities, states, modes and inputs.
@@ -880,7 +880,7 @@ class Custom(OnPoints):
         """
         return {}
 
-    def frictions(self, at: Any) -> Mapping[str, Friction]:
+    def frictions(self, at: At) -> Mapping[str, Friction]:
         """Return dry frictions with sticking by label. A single friction may have the label "".
 
         Args:
@@ -888,7 +888,7 @@ class Custom(OnPoints):
         """
         return {}
 
-    def stops(self, at: Any) -> Mapping[str, Stop | OneWay]:
+    def stops(self, at: At) -> Mapping[str, Stop | OneWay]:
         """Return rigid stops and freewheels by label. A single element may have the label "".
 
         Args:
@@ -896,7 +896,7 @@ class Custom(OnPoints):
         """
         return {}
 
-    def limits(self, at: Any) -> Mapping[str, tuple[SX | None, SX | None]]:
+    def limits(self, at: At) -> Mapping[str, tuple[SX | None, SX | None]]:
         """Return limits (lower, upper) of its coordinates, by port [rad or m].
 
         None for no limit.
@@ -906,7 +906,7 @@ class Custom(OnPoints):
         """
         return {}
 
-    def crossings(self, at: Any) -> Mapping[str, SX | Approach]:
+    def crossings(self, at: At) -> Mapping[str, SX | Approach]:
         """Return event indicators by label, which change sign where a law is not smooth.
 
         An indicator depends on positions, velocities, states and parameters. A step of

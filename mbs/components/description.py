@@ -386,7 +386,7 @@ class Description:
             return
         if b is not None:
             raise DescriptionError(
-                f"{self.name}: {_what(joint_or_point)} stands where a joint belongs;"
+                f"{self.name}: {_display_text(joint_or_point)} stands where a joint belongs;"
                 " write connect(point, joint, point)"
             )
         self._weld(self._point(a), self._point(joint_or_point))
@@ -408,7 +408,7 @@ class Description:
         is_output = isinstance(source, Signal) and source.kind == "output"
         if not (isinstance(source, str) or is_output):
             raise DescriptionError(
-                f"{self.name}: a wire comes from {_what(source)},"
+                f"{self.name}: a wire comes from {_display_text(source)},"
                 " which is no output; give an output of a component, or the name of a reading such"
                 " as 'encoder.q'"
             )
@@ -427,7 +427,7 @@ class Description:
             target = inputs[target]
         if not isinstance(target, Signal) or target.kind != "input":
             raise DescriptionError(
-                f"{self.name}: a wire leads to {_what(target)},"
+                f"{self.name}: a wire leads to {_display_text(target)},"
                 " which is no input; give an input of a component, such as motor.voltage"
             )
         for signal in (source, target):
@@ -464,7 +464,7 @@ class Description:
             DescriptionError: `shape` is no Shape, or the point is on no component of the mechanism.
         """
         if not isinstance(shape, Shape):
-            raise DescriptionError(f"{self.name}: {_what(shape)} is no shape; give a Shape")
+            raise DescriptionError(f"{self.name}: {_display_text(shape)} is no shape; give a Shape")
         self.shapes.append((self._point(point), shape))
 
     def cut(self, joint: Joint) -> None:
@@ -478,7 +478,8 @@ class Description:
         """
         if not isinstance(joint, Joint):
             raise DescriptionError(
-                f"{self.name}: {_what(joint)} is not a joint; give the joint itself, not its name"
+                f"{self.name}: {_display_text(joint)} is not a joint; give the joint itself, not"
+                " its name"
             )
         if self.components.get(joint.name) is not joint:
             raise DescriptionError(
@@ -620,7 +621,7 @@ class Description:
             point = point.frame
         if not isinstance(point, Point):
             raise DescriptionError(
-                f"{self.name}: {_what(point)} is not a point;"
+                f"{self.name}: {_display_text(point)} is not a point;"
                 " give a body, body.at(...) or joint.frame_a"
             )
         if self.components.get(point.owner.name) is not point.owner:
@@ -636,7 +637,7 @@ class Description:
         Raise DescriptionError if a joint frame is connected already.
         """
         for point in (a, b):
-            if isinstance(point.owner, Joint) and self._is_used(point):
+            if isinstance(point.owner, Joint) and self._is_connected(point):
                 raise DescriptionError(
                     f"{self.name}: frame_{point.port} of joint {point.owner.name!r} is connected"
                     " twice; use one joint for each connection"
@@ -650,7 +651,7 @@ class Description:
                 self.add(flange.owner)
         self.shafts.append(flanges)
 
-    def _is_used(self, point: Point) -> bool:
+    def _is_connected(self, point: Point) -> bool:
         """Return whether `point`, a frame of a joint, is connected.
 
         New connections are registered first.
@@ -667,7 +668,7 @@ class Description:
 check_arguments(Description)
 
 
-def _what(value: object) -> str:
+def _display_text(value: object) -> str:
     """Return the text of a value for messages: a component or signal by its name, else quoted."""
     if isinstance(value, Component):
         return f"{type(value).__name__} {value.name!r}"

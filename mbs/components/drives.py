@@ -13,7 +13,7 @@ from casadi import SX
 
 from mbs.components import custom
 from mbs.components.component import Component
-from mbs.components.custom import Custom, Flange, Load
+from mbs.components.custom import At, Custom, Flange, Load
 from mbs.components.forces import CoordinateForce
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
@@ -172,7 +172,7 @@ class TorqueSource(Device):
     tau = custom.input("N.m")
     w = custom.output("rad/s")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return {"flange": torque ON the shaft [N m]}, equal to the input `tau`.
 
         Args:
@@ -180,7 +180,7 @@ class TorqueSource(Device):
         """
         return {"flange": at.tau}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"w": speed of the shaft [rad/s]}.
 
         Args:
@@ -245,7 +245,7 @@ class DCMotor(Device):
         own = self.names_of("output")
         return own if "i" in self.state_names else ("i", *own)
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return {"i": di/dt [A/s]}; empty if the inductance is the number 0.
 
         Args:
@@ -254,7 +254,7 @@ class DCMotor(Device):
         left = at.voltage - at.constant * at.flange.speed - at.resistance * at.i
         return {"i": left / at.inductance} if "i" in self.state_names else {}
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return {"flange": torque ON the shaft, constant times current [N m]}.
 
         Args:
@@ -262,7 +262,7 @@ class DCMotor(Device):
         """
         return {"flange": at.constant * self._current(at)}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return "tau": torque ON the shaft [N m] and "w": its speed [rad/s].
 
         The current "i" [A] is a third output if it is no state.
@@ -274,7 +274,7 @@ class DCMotor(Device):
         values = {"tau": at.constant * i, "w": at.flange.speed}
         return values if "i" in self.state_names else {"i": i, **values}
 
-    def _current(self, at: Any) -> SX:
+    def _current(self, at: At) -> SX:
         """Return the current [A], a state or, without inductance, a function of voltage and speed.
 
         Without inductance it is (voltage - constant w) / resistance.
@@ -327,7 +327,7 @@ class BLDCMotor(Device):
         """Moment of inertia of the rotor [kg m^2], which the assembly adds to the shaft."""
         return expression(self.inertia)
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return the rates of the currents i_d and i_q [A/s].
 
         Args:
@@ -340,7 +340,7 @@ class BLDCMotor(Device):
             "i_q": (at.v_q - at.resistance * at.i_q - w * (L_d * at.i_d + at.flux)) / L_q,
         }
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return {"flange": torque ON the shaft [N m]}: the torque of the class docstring.
 
         Args:
@@ -348,7 +348,7 @@ class BLDCMotor(Device):
         """
         return {"flange": self._torque(at)}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return "tau": torque ON the shaft [N m], "w": its speed [rad/s], and "power".
 
         "power" is the electrical input power [W].
@@ -359,13 +359,13 @@ class BLDCMotor(Device):
         power = 1.5 * (at.v_d * at.i_d + at.v_q * at.i_q)
         return {"tau": self._torque(at), "w": at.flange.speed, "power": power}
 
-    def _torque(self, at: Any) -> SX:
+    def _torque(self, at: At) -> SX:
         """Return the torque on the shaft, 3/2 P (psi i_q + (L_d - L_q) i_d i_q) [N m]."""
         L_d, L_q = self._inductances(at)
         return SX(1.5 * at.pole_pairs * (at.flux * at.i_q + (L_d - L_q) * at.i_d * at.i_q))
 
     @staticmethod
-    def _inductances(at: Any) -> tuple[SX, SX]:
+    def _inductances(at: At) -> tuple[SX, SX]:
         """Return (L_d, L_q) [H]; L_q is L_d if it is not given."""
         return at.inductance_d, at.inductance_d if at.inductance_q is None else at.inductance_q
 
@@ -400,7 +400,7 @@ class ShaftForce(CoordinateForce):
         """True: the twist x is a sum of angles, not only of speeds."""
         return True
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"torque": `resistance` [N m]}, against which x is moved by the shafts.
 
         Args:
@@ -434,7 +434,7 @@ class ElasticShaft(ShaftForce, TwoFlanges):
         """(flange_a, 1) and (flange_b, -1): the twist x is angle_a - angle_b [rad]."""
         return (self.flange_a, Number(1.0)), (self.flange_b, Number(-1.0))
 
-    def resistance(self, at: Any) -> SX:
+    def resistance(self, at: At) -> SX:
         """Return the torque stiffness x + damping dx/dt [N m] from flange_a to flange_b.
 
         Args:
@@ -443,7 +443,7 @@ class ElasticShaft(ShaftForce, TwoFlanges):
         stiffness, damping = to_sx(self.stiffness, at.symbols), to_sx(self.damping, at.symbols)
         return SX(stiffness * at.x.q + damping * at.x.v)
 
-    def energy(self, at: Any) -> SX:
+    def energy(self, at: At) -> SX:
         """Return stiffness x^2 / 2 of the twist x [J].
 
         Args:
@@ -500,7 +500,7 @@ class ShaftDamper(ShaftForce, OneFlange):
         """(flange, 1): x is the angle of the flange [rad]."""
         return ((self.flange, Number(1.0)),)
 
-    def resistance(self, at: Any) -> SX:
+    def resistance(self, at: At) -> SX:
         """Return damping times shaft speed [N m]. The shaft gets the negative of this torque.
 
         Args:
@@ -508,7 +508,7 @@ class ShaftDamper(ShaftForce, OneFlange):
         """
         return SX(to_sx(self.damping, at.symbols) * at.x.v)
 
-    def dissipation(self, at: Any) -> SX:
+    def dissipation(self, at: At) -> SX:
         """Return the friction torque times the speed of the shaft [W].
 
         Args:

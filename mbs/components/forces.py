@@ -16,7 +16,7 @@ from casadi import SX
 from mbs.components import custom
 from mbs.components.bodies import three
 from mbs.components.component import Component, Point, SymbolTable, named_scalars
-from mbs.components.custom import Custom, Friction, Load, OneWay, RelativeMotion, Stop
+from mbs.components.custom import At, Custom, Friction, Load, OneWay, RelativeMotion, Stop
 from mbs.components.on_points import OnPair
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
@@ -65,7 +65,7 @@ class CoordinateForce(ForceElement):
         """Map from the single port "x" to the pairs (coordinate name, moment arm) of `levers`."""
         return {"x": self.levers}
 
-    def resistance(self, at: Any) -> SX:
+    def resistance(self, at: At) -> SX:
         """Return the effort (1, 1) against which x must be moved [N m or N].
 
         The element exerts the negative of this effort. The unit is N m if x is an angle, N if it is
@@ -76,7 +76,7 @@ class CoordinateForce(ForceElement):
         """
         raise NotImplementedError
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return {"x": -resistance}: effort of the element along x [N m or N].
 
         The assembly applies this effort times its moment arm to each joint coordinate.
@@ -110,7 +110,7 @@ class JointForce(CoordinateForce):
         """The single pair (`joint`, 1): x is this joint coordinate."""
         return ((self.joint, Number(1.0)),)
 
-    def limits(self, at: Any) -> Mapping[str, tuple[SX | None, SX | None]]:
+    def limits(self, at: At) -> Mapping[str, tuple[SX | None, SX | None]]:
         """Return {"x": (lower, upper)} [rad or m]. None is an open side; {} without both fields.
 
         Args:
@@ -199,7 +199,7 @@ class Force(PointSource):
     def __post_init__(self) -> None:
         self._take_vector("force")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return {"point": force ON the body at the origin of the point, in axes of the point} [N].
 
         There is no moment about the origin of the point, and no reaction on another body.
@@ -226,7 +226,7 @@ class Torque(PointSource):
     def __post_init__(self) -> None:
         self._take_vector("torque")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return {"point": torque ON the body, in axes of the point} [N m], without a reaction.
 
         Args:
@@ -237,7 +237,7 @@ class Torque(PointSource):
         }
 
 
-def _in_point_axes(components: tuple[Expression, ...], follows: bool, at: Any) -> SX:
+def _in_point_axes(components: tuple[Expression, ...], follows: bool, at: At) -> SX:
     """Return a constant vector (3, 1) in axes of the point `at.point`.
 
     The given components are in axes of the point if `follows`, else in axes of the world.
@@ -280,7 +280,7 @@ class LineForce(PairForce):
         """
         raise NotImplementedError
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the forces ON the points "a" and "b": the tension [N], towards the other point.
 
         Args:
@@ -288,7 +288,7 @@ class LineForce(PairForce):
         """
         return custom.pull(at.a, at.b, self._tension(at))
 
-    def energy(self, at: Any) -> SX:
+    def energy(self, at: At) -> SX:
         """Return `potential` [J] at the present distance of a and b.
 
         Args:
@@ -296,7 +296,7 @@ class LineForce(PairForce):
         """
         return self.potential(at.a.to(at.b).length, at.symbols)
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"force": tension [N]}, positive if the points are pulled together.
 
         Args:
@@ -304,7 +304,7 @@ class LineForce(PairForce):
         """
         return {"force": self._tension(at)}
 
-    def _tension(self, at: Any) -> SX:
+    def _tension(self, at: At) -> SX:
         """Return the tension [N] at the present distance of a and b and its rate."""
         motion = at.a.to(at.b)
         return self.tension(motion.length, motion.rate, at.symbols)
@@ -457,7 +457,7 @@ class SpringDamperSeries(ForceElement):
     force = custom.output("N")
     parallel = custom.parameter("N/m", 0.0, min=0)
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return {"elongation": dz/dt [m/s]}, the damper force divided by `damping`.
 
         Args:
@@ -465,7 +465,7 @@ class SpringDamperSeries(ForceElement):
         """
         return {"elongation": self._damper_force(at) / at.damping}
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the forces ON the points "a" and "b": tension T [N], towards the other point.
 
         Args:
@@ -473,7 +473,7 @@ class SpringDamperSeries(ForceElement):
         """
         return custom.pull(at.a, at.b, self._tension(at))
 
-    def energy(self, at: Any) -> SX:
+    def energy(self, at: At) -> SX:
         """Return the energy of both springs [J].
 
         It is stiffness (L - length - z)^2 / 2 + parallel z^2 / 2.
@@ -484,7 +484,7 @@ class SpringDamperSeries(ForceElement):
         stored = at.stiffness * self._stretch(at) ** 2 + at.parallel * at.elongation**2
         return SX(0.5 * stored)
 
-    def dissipation(self, at: Any) -> SX:
+    def dissipation(self, at: At) -> SX:
         """Return the power dissipated by the damper, damper force^2 / damping [W].
 
         Args:
@@ -492,7 +492,7 @@ class SpringDamperSeries(ForceElement):
         """
         return SX(self._damper_force(at) ** 2 / at.damping)
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"force": tension T [N]}, positive if it pulls the points together.
 
         Args:
@@ -500,18 +500,18 @@ class SpringDamperSeries(ForceElement):
         """
         return {"force": self._tension(at)}
 
-    def _stretch(self, at: Any) -> SX:
+    def _stretch(self, at: At) -> SX:
         """Return the elongation L - length - z of the series spring [m], negative if compressed."""
         return SX(at.a.to(at.b).length - at.length - at.elongation)
 
-    def _tension(self, at: Any) -> SX:
+    def _tension(self, at: At) -> SX:
         """Return the tension T of the series spring [N].
 
         Positive values pull the points together.
         """
         return SX(at.stiffness * self._stretch(at))
 
-    def _damper_force(self, at: Any) -> SX:
+    def _damper_force(self, at: At) -> SX:
         """Return the damper force T - parallel z [N] from the balance at the massless node."""
         return SX(self._tension(at) - at.parallel * at.elongation)
 
@@ -550,7 +550,7 @@ class SpringFrictionSeries(ForceElement):
     force = custom.output("N")
     slip = custom.output("m")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the forces ON the points "a" and "b": tension T [N], towards the other point.
 
         Args:
@@ -558,7 +558,7 @@ class SpringFrictionSeries(ForceElement):
         """
         return custom.pull(at.a, at.b, self._tension(at))
 
-    def energy(self, at: Any) -> SX:
+    def energy(self, at: At) -> SX:
         """Return the energy of both springs, T^2 / (2 stiffness) + parallel z^2 / 2 [J].
 
         Args:
@@ -567,7 +567,7 @@ class SpringFrictionSeries(ForceElement):
         z = self._elongation(at)
         return SX(0.5 * (self._tension(at) ** 2 / at.stiffness + at.parallel * z**2))
 
-    def dissipation(self, at: Any) -> SX:
+    def dissipation(self, at: At) -> SX:
         """Return the friction power during sliding [W]; zero while the friction sticks.
 
         Args:
@@ -576,7 +576,7 @@ class SpringFrictionSeries(ForceElement):
         share = at.stiffness / (at.stiffness + at.parallel)
         return SX(at.friction * share * at.direction * at.a.to(at.b).rate)
 
-    def events(self, at: Any) -> Mapping[str, custom.Event]:
+    def events(self, at: At) -> Mapping[str, custom.Event]:
         """Return the events "longer" and "shorter" (sliding begins in a direction) and "sticks".
 
         Sliding begins if |T - parallel z| reaches `friction`, and ends if the rate of L changes
@@ -599,7 +599,7 @@ class SpringFrictionSeries(ForceElement):
         stop = {"elongation": self._elongation(at), "direction": SX(0)}
         return {**found, "sticks": custom.Event(turned, stop)}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return "force": tension T [N], positive if it pulls, and "slip": elongation z [m].
 
         Args:
@@ -607,7 +607,7 @@ class SpringFrictionSeries(ForceElement):
         """
         return {"force": self._tension(at), "slip": self._elongation(at)}
 
-    def _sliding(self, at: Any, direction: SX | int) -> SX:
+    def _sliding(self, at: At, direction: SX | int) -> SX:
         """Return the elongation z [m] at which the friction slides.
 
         There T - parallel z is `direction` (1 or -1) times the friction force.
@@ -615,14 +615,14 @@ class SpringFrictionSeries(ForceElement):
         pull = at.stiffness * (at.a.to(at.b).length - at.length) - direction * at.friction
         return SX(pull / (at.stiffness + at.parallel))
 
-    def _elongation(self, at: Any) -> SX:
+    def _elongation(self, at: At) -> SX:
         """Return the elongation z of the friction [m].
 
         It is the stored value while the friction sticks, else that of sliding.
         """
         return SX(casadi.if_else(at.direction == 0, at.elongation, self._sliding(at, at.direction)))
 
-    def _tension(self, at: Any) -> SX:
+    def _tension(self, at: At) -> SX:
         """Return the tension T = stiffness (L - length - z) [N], positive if it pulls."""
         return SX(at.stiffness * (at.a.to(at.b).length - at.length - self._elongation(at)))
 
@@ -678,7 +678,7 @@ class Bushing(PairForce):
         self._require_magnitudes(*_STRENGTHS)
         self._require_effect(*_STRENGTHS)
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the wrenches ON the frames "a" and "b", each about its origin and in its axes.
 
         The force pulls the origins together. The force on b acts at its origin, so that the
@@ -687,11 +687,11 @@ class Bushing(PairForce):
         Args:
             at: values of the component and motion of its ports, see `custom.At`.
         """
-        motion, force, moment = self._at_b(at)
+        motion, force, moment = self._load_at_b(at)
         on_a = custom.FrameLoad(force, moment + cross(motion.p, force))
         return custom.between(at.a, at.b, on_a, -moment)
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return the wrench ON the body of a about the origin of b, in axes of a.
 
         Names: force_x, force_y, force_z [N]; moment_x, moment_y, moment_z [N m].
@@ -699,11 +699,11 @@ class Bushing(PairForce):
         Args:
             at: values of the component and motion of its ports, see `custom.At`.
         """
-        _, force, moment = self._at_b(at)
+        _, force, moment = self._load_at_b(at)
         values = (*casadi.vertsplit(force), *casadi.vertsplit(moment))
         return dict(zip(self.output_names, values, strict=True))
 
-    def _at_b(self, at: Any) -> tuple[RelativeMotion, SX, SX]:
+    def _load_at_b(self, at: At) -> tuple[RelativeMotion, SX, SX]:
         """Return the motion of b in a, and force [N] and moment [N m] ON a about the origin of b.
 
         All are in axes of a, (3, 1).
@@ -712,12 +712,14 @@ class Bushing(PairForce):
         half, cosine = _half_turn(motion.R)
         w = motion.w
         rate = cosine * w + cross(w, half)
-        force = self._sum("stiffness", motion.p, "damping", motion.V, symbols)
-        torque = self._sum("angular_stiffness", 2 * half, "angular_damping", rate, symbols)
+        force = self._elementwise_sum("stiffness", motion.p, "damping", motion.V, symbols)
+        torque = self._elementwise_sum(
+            "angular_stiffness", 2 * half, "angular_damping", rate, symbols
+        )
         moment = cosine * torque + cross(half, torque)
         return motion, force, moment
 
-    def energy(self, at: Any) -> SX:
+    def energy(self, at: At) -> SX:
         """Return the energy p' K p / 2 + phi' K_phi phi / 2 [J], zero if the frames coincide.
 
         Args:
@@ -730,7 +732,7 @@ class Bushing(PairForce):
             total += 0.5 * casadi.dot(x, self._vector(name, at.symbols) * x)
         return total
 
-    def _sum(self, one: str, x: SX, other: str, rate: SX, symbols: SymbolTable) -> SX:
+    def _elementwise_sum(self, one: str, x: SX, other: str, rate: SX, symbols: SymbolTable) -> SX:
         """Return the sum (3, 1) of the fields `one` times x and `other` times rate, elementwise."""
         return self._vector(one, symbols) * x + self._vector(other, symbols) * rate
 
@@ -808,7 +810,7 @@ class JointStop(JointForce):
         """True: the depth beyond a limit depends on the position, not only on the rate."""
         return True
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"effort": effort ON the joint [N m or N]}: negative at the upper limit.
 
         It is positive at the lower limit and zero between the limits.
@@ -818,7 +820,7 @@ class JointStop(JointForce):
         """
         return {"effort": -self.resistance(at)}
 
-    def resistance(self, at: Any) -> SX:
+    def resistance(self, at: At) -> SX:
         """Return the effort against which the joint is moved: positive beyond the upper limit.
 
         It is negative beyond the lower limit and zero between the limits. Its size is stiffness
@@ -830,13 +832,13 @@ class JointStop(JointForce):
         """
         stiffness, damping = to_sx(self.stiffness, at.symbols), to_sx(self.damping, at.symbols)
         total = SX(0)
-        for sign, depth, width in self._sides(at.x.q, at.symbols):
+        for sign, depth, width in self._stop_depths(at.x.q, at.symbols):
             share, ramp, _ = smooth_ramp(depth, width)
             spring = stiffness * ramp
             total += sign * spring + one_sided_damping(damping * share * at.x.v, spring)
         return total
 
-    def energy(self, at: Any) -> SX:
+    def energy(self, at: At) -> SX:
         """Return the energy of the stop springs [J]; zero between the limits.
 
         Args:
@@ -844,11 +846,12 @@ class JointStop(JointForce):
         """
         stiffness = to_sx(self.stiffness, at.symbols)
         areas = (
-            smooth_ramp(depth, width)[2] for _, depth, width in self._sides(at.x.q, at.symbols)
+            smooth_ramp(depth, width)[2]
+            for _, depth, width in self._stop_depths(at.x.q, at.symbols)
         )
         return stiffness * sum(areas, SX(0))
 
-    def _sides(self, q: SX, symbols: SymbolTable) -> list[tuple[float, SX, SX]]:
+    def _stop_depths(self, q: SX, symbols: SymbolTable) -> list[tuple[float, SX, SX]]:
         """Return (sign, depth beyond the limit, width) [1, rad or m] of each stop at position q.
 
         The sign is 1 for the upper and -1 for the lower limit. The depth is negative within the
@@ -927,7 +930,7 @@ class JointFriction(JointForce):
         self._require_positive("velocity", "width")
         self._require_effect("coulomb", "stribeck", "viscous")
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"effort": friction effort ON the joint [N m or N]}, opposed to its velocity.
 
         Args:
@@ -935,7 +938,7 @@ class JointFriction(JointForce):
         """
         return {"effort": -self.resistance(at)}
 
-    def resistance(self, at: Any) -> SX:
+    def resistance(self, at: At) -> SX:
         """Return the friction effort (1, 1) of the class docstring; its sign is that of v.
 
         Args:
@@ -949,7 +952,7 @@ class JointFriction(JointForce):
         total: SX = to_sx(self.viscous, symbols) * v
         return total + coulomb * smooth_sign(v, to_sx(self.width, symbols))
 
-    def dissipation(self, at: Any) -> SX:
+    def dissipation(self, at: At) -> SX:
         """Return the friction power: resistance times velocity [W], never negative.
 
         Args:
@@ -1025,7 +1028,7 @@ class FixedTendon(CoordinateForce):
         inner = Component.scoped(self, prefix)
         return replace(inner, levers=tuple((f"{prefix}.{n}", c) for n, c in inner.levers))
 
-    def resistance(self, at: Any) -> SX:
+    def resistance(self, at: At) -> SX:
         """Return the tension of the class docstring [N]; negative if the tendon pushes.
 
         Damping and friction also act while the spring is slack.
@@ -1041,7 +1044,7 @@ class FixedTendon(CoordinateForce):
             total += to_sx(self.friction, symbols) * smooth_sign(rate, width)
         return total
 
-    def energy(self, at: Any) -> SX:
+    def energy(self, at: At) -> SX:
         """Return stiffness times stretch^2 / 2 [J]; zero while the spring is slack.
 
         Args:
@@ -1049,7 +1052,7 @@ class FixedTendon(CoordinateForce):
         """
         return 0.5 * to_sx(self.stiffness, at.symbols) * self._stretch(at.x.q, at.symbols) ** 2
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"tension": tension [N]}, negative if the tendon pushes.
 
         Args:
@@ -1131,7 +1134,7 @@ class RigidStop(JointContact):
         """True: the limits are limits of a position."""
         return True
 
-    def stops(self, at: Any) -> Mapping[str, Stop | OneWay]:
+    def stops(self, at: At) -> Mapping[str, Stop | OneWay]:
         """Return {"": Stop} that keeps the coordinate between lower and upper [rad or m].
 
         Args:
@@ -1175,7 +1178,7 @@ class CoulombFriction(JointContact):
                 " nothing; give a strength or leave it out"
             )
 
-    def frictions(self, at: Any) -> Mapping[str, Friction]:
+    def frictions(self, at: At) -> Mapping[str, Friction]:
         """Return {"": Friction} whose slip is the velocity of the coordinate [rad/s or m/s].
 
         Args:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Any
 
 import casadi
 from casadi import SX
 
 from mbs.components import custom
-from mbs.components.custom import Custom, Load
+from mbs.components.custom import At, Custom, Load
 from mbs.components.drives import Device, TwoFlanges
 
 
@@ -38,7 +37,7 @@ class ForceInput(_GivenOnPoint):
     y = custom.input("N")
     z = custom.input("N")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return {"point": force (x, y, z) ON the body [N]} at the origin of the point.
 
         The components are along the axes of the world or of the point, see `axes`. No other body
@@ -64,7 +63,7 @@ class TorqueInput(_GivenOnPoint):
     y = custom.input("N.m")
     z = custom.input("N.m")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return {"point": torque (x, y, z) ON the body [N m]}, without a reaction on other bodies.
 
         The components are along the axes of the world or of the point, see `axes`.
@@ -92,7 +91,7 @@ class PairForceInput(Custom):
     y = custom.input("N")
     z = custom.input("N")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the wrenches by "a" and "b": force (x, y, z) ON b at its origin, reaction ON a.
 
         Each is in axes of its own frame, about its own origin [N, N m].
@@ -120,7 +119,7 @@ class PairTorqueInput(Custom):
     y = custom.input("N.m")
     z = custom.input("N.m")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the torques by "a" and "b": (x, y, z) ON b, the opposite ON a [N m].
 
         The inputs are along the axes of a. Each load is converted to axes of its own frame.
@@ -147,7 +146,7 @@ class LineForceInput(Custom):
     length = custom.output("m")
     speed = custom.output("m/s")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the forces ON the points "a" and "b": `tension` [N], towards the other point.
 
         Args:
@@ -155,7 +154,7 @@ class LineForceInput(Custom):
         """
         return custom.pull(at.a, at.b, at.tension)
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return "length": distance of the points [m], and "speed": its rate [m/s].
 
         Args:
@@ -178,7 +177,7 @@ class JointEffort(Custom):
     joint = custom.coordinate()
     tau = custom.input(custom.EFFORT)
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return {"joint": effort ON the coordinate [N m or N]}, equal to the input `tau`.
 
         Args:
@@ -192,7 +191,7 @@ class ShaftTorqueInput(TwoFlanges):
 
     tau = custom.input("N.m")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the torques ON the shafts [N m]: `tau` on "flange_b", -`tau` on "flange_a".
 
         Args:
@@ -208,7 +207,7 @@ class SlidingForceInput(TwoFlanges):
     flange_b = custom.flange(slides=True)
     force = custom.input("N")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the forces ON the flanges [N]: `force` on "flange_b", -`force` on "flange_a".
 
         Args:
@@ -227,7 +226,7 @@ class ForceSource(Device):
     force = custom.input("N")
     v = custom.output("m/s")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return {"flange": force ON the sliding part [N]}, equal to the input `force`.
 
         Args:
@@ -235,7 +234,7 @@ class ForceSource(Device):
         """
         return {"flange": at.force}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"v": velocity of the flange [m/s]}.
 
         Args:

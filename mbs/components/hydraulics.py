@@ -8,13 +8,12 @@ pressure means that a real cylinder would cavitate.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import casadi
 from casadi import SX
 
 from mbs.components import custom
-from mbs.components.custom import Custom, Load
+from mbs.components.custom import At, Custom, Load
 from mbs.components.forces import one_sided_damping, smooth_ramp
 
 
@@ -69,7 +68,7 @@ class HydraulicCylinder(Custom):
     flow_b = custom.input("m3/s")
     force = custom.output("N")
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return the rates of the gauge pressures p_a and p_b of the two chambers [Pa/s].
 
         Args:
@@ -84,7 +83,7 @@ class HydraulicCylinder(Custom):
             "p_b": at.bulk / volume_b * (at.flow_b + at.area_b * rate + past),
         }
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the forces ON the points "a" and "b": `force` [N], away from the other point.
 
         Args:
@@ -92,15 +91,15 @@ class HydraulicCylinder(Custom):
         """
         return custom.pull(at.a, at.b, -self._force(at))
 
-    def energy(self, at: Any) -> SX:
+    def energy(self, at: At) -> SX:
         """Return the energy of the end stops [J], zero between them; the oil is not included.
 
         Args:
             at: values of the component and motion of its ports, see `custom.At`.
         """
-        return SX(at.end_stiffness * sum((area for _, _, _, area in self._ends(at)), SX(0)))
+        return SX(at.end_stiffness * sum((area for _, _, _, area in self._end_stops(at)), SX(0)))
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"force": total force of the class docstring [N]}, positive if it pushes.
 
         Args:
@@ -108,17 +107,17 @@ class HydraulicCylinder(Custom):
         """
         return {"force": self._force(at)}
 
-    def _force(self, at: Any) -> SX:
+    def _force(self, at: At) -> SX:
         """Return pressure force, friction and end stop force [N]; positive if it pushes apart."""
         rate = at.a.to(at.b).rate
         total = at.p_a * at.area_a - at.p_b * at.area_b - at.friction * rate
-        for sign, share, depth, _ in self._ends(at):
+        for sign, share, depth, _ in self._end_stops(at):
             spring = at.end_stiffness * depth
             total += sign * spring - one_sided_damping(at.end_damping * share * rate, spring)
         return SX(total)
 
     @staticmethod
-    def _ends(at: Any) -> list[tuple[float, SX, SX, SX]]:
+    def _end_stops(at: At) -> list[tuple[float, SX, SX, SX]]:
         """Return (sign, ramp slope, ramp [m], integral of the ramp [m^2]) of the two end stops.
 
         The sign is 1 at s = 0, where the stop pushes the points apart, and -1 at s = stroke. The
@@ -159,7 +158,7 @@ class HydraulicValve(Custom):
     flow_a = custom.output("m3/s")
     flow_b = custom.output("m3/s")
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return flow_a and flow_b: flows from the valve INTO chambers a and b [m^3/s].
 
         Args:
@@ -175,7 +174,7 @@ class HydraulicValve(Custom):
         }
 
     @staticmethod
-    def _flow(at: Any, drop: SX) -> SX:
+    def _flow(at: At, drop: SX) -> SX:
         """Return the flow through a fully open edge at the pressure difference `drop` [Pa] [m^3/s].
 
         It has the sign of `drop`.

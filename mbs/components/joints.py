@@ -235,7 +235,7 @@ def motor_range(where: str, quantity: str, given: Any) -> Range | None:
     """
     if given is None:
         return None
-    lower, upper = _pair(given) if np.ndim(given) else _both(given)
+    lower, upper = _as_pair(given) if np.ndim(given) else _symmetric_range(given)
     if not lower < upper or lower > 0 or upper < 0:
         raise DescriptionError(
             f"{where}: {quantity} is {quoted(given)}; give the largest one, above zero, or"
@@ -244,13 +244,13 @@ def motor_range(where: str, quantity: str, given: Any) -> Range | None:
     return lower, upper
 
 
-def _both(given: Any) -> Range:
+def _symmetric_range(given: Any) -> Range:
     """Return (-given, given) as floats; (NaN, NaN) if it is not a number."""
-    largest = _pair((given, given))[0]
+    largest = _as_pair((given, given))[0]
     return -largest, largest
 
 
-def _pair(pair: Any) -> Range:
+def _as_pair(pair: Any) -> Range:
     """Return (low, high) as floats; (NaN, NaN) if the value is not a pair of numbers."""
     if has_boolean(pair):
         return math.nan, math.nan
@@ -272,7 +272,7 @@ def _interval(name: str, suffix: Any, pair: Any, known: set[str]) -> Range:
             f"{name}: limits {quoted(pair)} name no coordinate of one number; "
             + (f"give a mapping from {sorted(known)}" if known else "leave them out")
         )
-    low, high = _pair(pair)
+    low, high = _as_pair(pair)
     if not low < high:
         raise DescriptionError(
             f"{name}: limits {quoted(pair)} are not (lower, upper); give two numbers in order"

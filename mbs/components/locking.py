@@ -108,15 +108,15 @@ class _Locks:
                 return
             for coupling in touched:
                 pending.remove(coupling)
-                left = self._among_free(coupling)
+                left = self._in_free_coordinates(coupling)
                 if set(left.coordinates) & self.values.keys():
-                    self._follow(left)
+                    self._lock_coupled(left)
                     self.gone.add(left.name)
                 else:  # it couples only free joints, so far
                     self.changed[left.name] = left
                     pending.append(left)
 
-    def _among_free(self, coupling: Coupling) -> Coupling:
+    def _in_free_coordinates(self, coupling: Coupling) -> Coupling:
         """Return a coupling of its unlocked coordinates, with the locked ones in its constant term.
 
         A coupling of two coordinates is returned unchanged.
@@ -160,7 +160,7 @@ class _Locks:
             )
         return offset, factor
 
-    def _follow(self, coupling: Coupling) -> None:
+    def _lock_coupled(self, coupling: Coupling) -> None:
         """Lock the unlocked coordinate of a coupling of two coordinates.
 
         Raise DescriptionError if both are locked and disagree.

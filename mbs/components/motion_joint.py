@@ -11,7 +11,7 @@ from casadi import SX
 
 from mbs.components import custom
 from mbs.components.component import Point
-from mbs.components.custom import Custom, Row
+from mbs.components.custom import At, Custom, Row
 from mbs.components.joints import Free
 from mbs.errors import DescriptionError
 from mbs.spatial import Pose, vector
@@ -46,7 +46,7 @@ class MotionJoint(Custom):
                 " pose of frame_b in frame_a"
             )
 
-    def motion(self, at: Any) -> Pose:
+    def motion(self, at: At) -> Pose:
         """Return the required pose of frame_b relative to frame_a.
 
         A subclass writes it with `rotation` and `translation`.
@@ -66,7 +66,7 @@ class MotionJoint(Custom):
         points: dict[str, Any] = {"frame_a": a, "frame_b": b}
         return replace(self, **points), Free(f"{self.name}.free")
 
-    def rows(self, at: Any) -> Mapping[str, Row | SX]:
+    def rows(self, at: At) -> Mapping[str, Row | SX]:
         """Return six rows: position and rotation error of frame_b relative to the pose of `motion`.
 
         "force x", "force y", "force z" are the position error in axes of frame_a [m]. "moment x",
@@ -83,7 +83,7 @@ class MotionJoint(Custom):
             **{f"moment {a}": Row(0.5 * r, "1") for a, r in zip("xyz", (x, y, z), strict=True)},
         }
 
-    def positive(self, at: Any) -> Mapping[str, SX]:
+    def positive(self, at: At) -> Mapping[str, SX]:
         """Return "axis x", "axis y", "axis z": cosines between axes of frame_b and of `motion`.
 
         Positive values exclude configurations whose rows are zero with an opposed axis.
@@ -94,7 +94,7 @@ class MotionJoint(Custom):
         _, R = self._displacement(at)
         return {f"axis {axis}": R[k, k] for k, axis in enumerate("xyz")}
 
-    def _displacement(self, at: Any) -> tuple[SX, SX]:
+    def _displacement(self, at: At) -> tuple[SX, SX]:
         """Return the position error (3, 1) and the rotation (3, 3) of frame_b relative to `motion`.
 
         The position error is in axes of frame_a [m], the rotation in axes of `motion`. Raise

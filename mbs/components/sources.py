@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from mbs.components import custom
 from mbs.components.blocks import SignalBlock
-from mbs.components.custom import Custom, Event
+from mbs.components.custom import At, Custom, Event
 from mbs.errors import DescriptionError
 from mbs.text import did_you_mean, quoted
 
@@ -42,7 +42,7 @@ class SignalSource(SignalBlock):
     clock = custom.state("s")
     y = custom.output()
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return {"clock": 1}: one second per second.
 
         Args:
@@ -51,7 +51,7 @@ class SignalSource(SignalBlock):
         return {"clock": SX(1)}
 
 
-def _held(begun: SX, signal: SX) -> SX:
+def _zero_before_start(begun: SX, signal: SX) -> SX:
     """Return `signal` if `begun`, the time since its start [s], is at least zero; else zero."""
     return casadi.if_else(begun >= 0, signal, 0)
 
@@ -72,15 +72,15 @@ class Step(SignalSource):
     start_time = custom.parameter("s", 0.0)
     offset = custom.parameter("1", 0.0)
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"y": offset, plus height from start_time on}.
 
         Args:
             at: values of the component and motion of its ports, see `custom.At`.
         """
-        return {"y": at.offset + _held(at.clock - at.start_time, at.height)}
+        return {"y": at.offset + _zero_before_start(at.clock - at.start_time, at.height)}
 
-    def crossings(self, at: Any) -> Mapping[str, SX]:
+    def crossings(self, at: At) -> Mapping[str, SX]:
         """Return {"start": time since start_time [s]}, the event indicator of the step.
 
         Args:
@@ -104,7 +104,7 @@ class Ramp(SignalSource):
     start_time = custom.parameter("s", 0.0)
     offset = custom.parameter("1", 0.0)
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"y": ramp of the class docstring}, constant before and after the rise.
 
         Args:
@@ -113,7 +113,7 @@ class Ramp(SignalSource):
         part = (at.clock - at.start_time) / at.duration
         return {"y": at.offset + at.height * casadi.fmin(casadi.fmax(part, 0), 1)}
 
-    def crossings(self, at: Any) -> Mapping[str, SX]:
+    def crossings(self, at: At) -> Mapping[str, SX]:
         """Return the times since the start ("start") and the end ("end") of the rise [s].
 
         Args:
@@ -142,23 +142,23 @@ class Sine(SignalSource):
     start_time = custom.parameter("s", 0.0)
     offset = custom.parameter("1", 0.0)
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"y": value of the class equation; offset before start_time}.
 
         Args:
             at: values of the component and motion of its ports, see `custom.At`.
         """
         begun = at.clock - at.start_time
-        return {"y": at.offset + _held(begun, self._wave(at, begun))}
+        return {"y": at.offset + _zero_before_start(begun, self._wave(at, begun))}
 
-    def _wave(self, at: Any, begun: SX) -> SX:
+    def _wave(self, at: At, begun: SX) -> SX:
         """Return the deviation of y from the offset.
 
         `begun` is the time since start_time [s].
         """
         return SX(at.amplitude * casadi.sin(2 * math.pi * at.frequency * begun + at.phase))
 
-    def crossings(self, at: Any) -> Mapping[str, SX]:
+    def crossings(self, at: At) -> Mapping[str, SX]:
         """Return {"start": time since start_time [s]}.
 
         Args:
@@ -177,7 +177,7 @@ class ExpSine(Sine):
 
     damping = custom.parameter("1/s", 1.0)
 
-    def _wave(self, at: Any, begun: SX) -> SX:
+    def _wave(self, at: At, begun: SX) -> SX:
         """Return the damped deviation of y from the offset.
 
         `begun` is the time since start_time [s].
@@ -214,7 +214,7 @@ class KinematicPTP(SignalSource):
 
     def __post_init__(self) -> None:
         Custom.__post_init__(self)
-        shortest, given = self.shortest_duration, self._number("duration")
+        shortest, given = self.shortest_duration, self._parameter_value("duration")
         # a duration that was computed from other numbers may be shorter by rounding
         if shortest is not None and given is not None and given < shortest * (1 - 1e-9):
             raise DescriptionError(
@@ -225,14 +225,14 @@ class KinematicPTP(SignalSource):
     @property
     def shortest_duration(self) -> float | None:
         """Shortest duration that the limits allow [s]; None if one of the numbers is a symbol."""
-        found = [self._number(name) for name in ("begin", "end", "v_max", "a_max")]
+        found = [self._parameter_value(name) for name in ("begin", "end", "v_max", "a_max")]
         known = [SX(value) for value in found if value is not None]
         if len(known) < len(found):
             return None
         times = _ptp_times(*known)
         return float(casadi.evalf(times[-1]))
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return position "y", its rate "v" and the rate "a" of v.
 
         Before the motion y is `begin`, after it `end`; v and a are then zero.
@@ -241,9 +241,9 @@ class KinematicPTP(SignalSource):
             at: values of the component and motion of its ports, see `custom.At`.
         """
         rise, brake, last = _ptp_times(at.begin, at.end, at.v_max, at.a_max)
-        slower, distance = self._slower(at, last), casadi.fabs(at.end - at.begin)
+        slowdown, distance = self._slowdown(at, last), casadi.fabs(at.end - at.begin)
         sign = casadi.if_else(at.end < at.begin, -1, 1)
-        s = casadi.fmin(casadi.fmax((at.clock - at.start_time) / slower, 0), last)
+        s = casadi.fmin(casadi.fmax((at.clock - at.start_time) / slowdown, 0), last)
         left, peak = last - s, at.a_max * rise
         phases = (
             (s < rise, (at.a_max * s**2 / 2, at.a_max * s, at.a_max)),
@@ -253,14 +253,14 @@ class KinematicPTP(SignalSource):
         for holds, values in reversed(phases):
             found = [casadi.if_else(holds, *pair) for pair in zip(values, found, strict=True)]
         begun = at.clock - at.start_time
-        moving = casadi.logic_and(begun >= 0, begun < slower * last)
+        moving = casadi.logic_and(begun >= 0, begun < slowdown * last)
         return {
             "y": at.begin + sign * found[0],
-            "v": sign * found[1] / slower,
-            "a": casadi.if_else(moving, sign * found[2] / slower**2, 0),
+            "v": sign * found[1] / slowdown,
+            "a": casadi.if_else(moving, sign * found[2] / slowdown**2, 0),
         }
 
-    def crossings(self, at: Any) -> Mapping[str, SX]:
+    def crossings(self, at: At) -> Mapping[str, SX]:
         """Return the times since "start", "rise", "brake" and "end" [s], where a jumps.
 
         "rise" is the end of the acceleration, "brake" the begin of the braking.
@@ -269,13 +269,13 @@ class KinematicPTP(SignalSource):
             at: values of the component and motion of its ports, see `custom.At`.
         """
         times = _ptp_times(at.begin, at.end, at.v_max, at.a_max)
-        slower, begun = self._slower(at, times[-1]), at.clock - at.start_time
+        slowdown, begun = self._slowdown(at, times[-1]), at.clock - at.start_time
         after = {
-            n: begun - slower * t for n, t in zip(("rise", "brake", "end"), times, strict=True)
+            n: begun - slowdown * t for n, t in zip(("rise", "brake", "end"), times, strict=True)
         }
         return {"start": begun, **after}
 
-    def _slower(self, at: Any, shortest: SX) -> SX:
+    def _slowdown(self, at: At, shortest: SX) -> SX:
         """Return the factor by which the given duration slows down the fastest motion.
 
         It is `duration` divided by `shortest`, the shortest duration [s]; 1 without duration or
@@ -319,11 +319,11 @@ class PeriodicSource(SignalSource):
     number = custom.mode(-1.0)
     entered = custom.mode()
 
-    def _durations(self, at: Any) -> list[SX]:
+    def _durations(self, at: At) -> list[SX]:
         """Return the duration of each phase of a period [s]."""
         raise NotImplementedError
 
-    def _level(self, at: Any, since: SX) -> list[SX]:
+    def _level(self, at: At, since: SX) -> list[SX]:
         """Return the height in each phase, divided by the amplitude.
 
         `since` is the time since the start of the phase [s].
@@ -332,13 +332,13 @@ class PeriodicSource(SignalSource):
 
     def _require_count(self) -> None:
         """Raise DescriptionError if `count` is a number that is negative or not whole."""
-        count = self._number("count")
+        count = self._parameter_value("count")
         if count is not None and (count < 0 or count != int(count)):
             raise DescriptionError(
                 f"{self.name}: count is {count:g}; give a whole number of periods, or leave it out"
             )
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"y": offset, plus amplitude times the height of the present phase}.
 
         It is the offset before start_time and after the last period.
@@ -349,10 +349,11 @@ class PeriodicSource(SignalSource):
         level = self._level(at, at.clock - at.entered)
         height = sum((casadi.if_else(at.phase == k, h, 0) for k, h in enumerate(level)), SX(0))
         return {
-            "y": at.offset + casadi.if_else(self._runs(at, at.number), at.amplitude * height, 0)
+            "y": at.offset
+            + casadi.if_else(self._has_period(at, at.number), at.amplitude * height, 0)
         }
 
-    def _runs(self, at: Any, number: SX) -> SX:
+    def _has_period(self, at: At, number: SX) -> SX:
         """Return whether the period of index `number` exists: 0 <= number < count.
 
         Without a count there is no upper limit.
@@ -360,7 +361,7 @@ class PeriodicSource(SignalSource):
         begun = number >= 0
         return begun if at.count is None else casadi.logic_and(begun, number < at.count)
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return {"clock": 1, "left": -1}; the rate of `left` is zero after the last period.
 
         Args:
@@ -369,7 +370,7 @@ class PeriodicSource(SignalSource):
         over = SX(0) if at.count is None else at.number >= at.count
         return {**SignalSource.rates(self, at), "left": casadi.if_else(over, 0, -1)}
 
-    def events(self, at: Any) -> Mapping[str, Event]:
+    def events(self, at: At) -> Mapping[str, Event]:
         """Return the event "switches" at left = 0, which sets phase, number, left and entered.
 
         It starts the next phase. The first event, at the first time, finds the phase of that time.
@@ -392,7 +393,7 @@ class PeriodicSource(SignalSource):
         begin = {
             "phase": casadi.if_else(late, last, phase),
             "number": casadi.if_else(late, -1, number),
-            "left": casadi.if_else(late, -begun, _at(durations, phase) + entered - within),
+            "left": casadi.if_else(late, -begun, _element_at(durations, phase) + entered - within),
             "entered": at.clock - casadi.if_else(late, 0, within - entered),
         }
         # all others
@@ -403,7 +404,7 @@ class PeriodicSource(SignalSource):
             "phase": next_phase,
             "number": counted,
             # after the last period the time to the next event stays at some positive value
-            "left": casadi.if_else(over, period, _at(durations, next_phase)),
+            "left": casadi.if_else(over, period, _element_at(durations, next_phase)),
             "entered": at.clock,
         }
         return {
@@ -413,7 +414,7 @@ class PeriodicSource(SignalSource):
         }
 
 
-def _at(values: Sequence[SX], index: SX) -> SX:
+def _element_at(values: Sequence[SX], index: SX) -> SX:
     """Return the element of `values` at `index`, an expression; zero if it is out of range."""
     return sum((casadi.if_else(index == k, value, 0) for k, value in enumerate(values)), SX(0))
 
@@ -441,11 +442,11 @@ class Pulse(PeriodicSource):
         Custom.__post_init__(self)
         self._require_count()
 
-    def _durations(self, at: Any) -> list[SX]:
+    def _durations(self, at: At) -> list[SX]:
         """Return the durations of the pulse and of the rest of a period [s]."""
         return [SX(at.duty * at.period), SX((1 - at.duty) * at.period)]
 
-    def _level(self, at: Any, since: SX) -> list[SX]:
+    def _level(self, at: At, since: SX) -> list[SX]:
         """Return the heights of a pulse (1) and of the rest of a period (0)."""
         return [SX(1), SX(0)]
 
@@ -476,7 +477,7 @@ class Trapezoid(PeriodicSource):
     def __post_init__(self) -> None:
         Custom.__post_init__(self)
         self._require_count()
-        found = [self._number(name) for name in ("period", "rising", "width", "falling")]
+        found = [self._parameter_value(name) for name in ("period", "rising", "width", "falling")]
         period, *parts = (value if value is not None else 0.0 for value in found)
         # the sum of decimal fractions may exceed the period by rounding
         if found[0] is not None and sum(parts) > period * (1 + 1e-12):
@@ -485,12 +486,12 @@ class Trapezoid(PeriodicSource):
                 f" is {period:g} s; give a longer period or shorter parts"
             )
 
-    def _durations(self, at: Any) -> list[SX]:
+    def _durations(self, at: At) -> list[SX]:
         """Return the durations of rise, full height, fall and rest of a period [s]."""
         rest = casadi.fmax(at.period - at.rising - at.width - at.falling, 0)
         return [at.rising, at.width, at.falling, rest]
 
-    def _level(self, at: Any, since: SX) -> list[SX]:
+    def _level(self, at: At, since: SX) -> list[SX]:
         """Return the heights in rise, full height, fall and rest, from 0 to 1.
 
         `since` is the time since the start of the phase [s].
@@ -668,7 +669,7 @@ class Table(SignalSource):
         every = np.vstack([outside[:1], inner, outside[1:]])
         return np.concatenate([begins[:1], begins, t[-1:]]), every
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return {"clock": 1, "left": -1}; the rate of `left` is zero after the table.
 
         Args:
@@ -677,7 +678,7 @@ class Table(SignalSource):
         last = len(self._intervals()[0]) - 1
         return {**SignalSource.rates(self, at), "left": casadi.if_else(at.row == last, 0, -1)}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"y": polynomial of the present interval at the clock}.
 
         Args:
@@ -686,7 +687,7 @@ class Table(SignalSource):
         s = at.clock - at.knot
         return {"y": at.c0 + s * (at.c1 + s * (at.c2 + s * at.c3))}
 
-    def events(self, at: Any) -> Mapping[str, Event]:
+    def events(self, at: At) -> Mapping[str, Event]:
         """Return the event "next" at left = 0, which sets left, row, knot and c0 .. c3.
 
         It starts the next interval. The first event, at the first time, finds the interval of that
@@ -813,7 +814,7 @@ class ReferenceFilter(SignalBlock):
     v = custom.output()
     a = custom.output()
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return {"x": w, "w": acceleration [1/s2]}.
 
         Args:
@@ -821,7 +822,7 @@ class ReferenceFilter(SignalBlock):
         """
         return {"x": at.w, "w": self._acceleration(at)}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return the filtered position "q", its rate "v" and the rate "a" of v.
 
         Args:
@@ -829,7 +830,7 @@ class ReferenceFilter(SignalBlock):
         """
         return {"q": at.x, "v": at.w, "a": self._acceleration(at)}
 
-    def _acceleration(self, at: Any) -> SX:
+    def _acceleration(self, at: At) -> SX:
         """Return the acceleration of the filtered position for the input u [1/s2]."""
         w = 2 * math.pi * at.frequency
         # Bessel filter of order 2: 1 / (1 + 1.3617 s/w + 0.6180 (s/w)^2), -3 dB at w

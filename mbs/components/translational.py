@@ -8,12 +8,11 @@ to a sliding part.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from casadi import SX
 
 from mbs.components import custom
-from mbs.components.custom import Load
+from mbs.components.custom import At, Load
 from mbs.components.drives import RigidPart, TwoFlanges
 from mbs.components.forces import one_sided_damping, smooth_ramp
 from mbs.components.rotational import BrakingForce, RigidBrake, friction_of
@@ -54,7 +53,7 @@ class _BetweenSlides(TwoFlanges):
     flange_b = custom.flange(slides=True)
     force = custom.output("N")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the forces ON the flanges [N]: "flange_a": tension, "flange_b": -tension.
 
         Args:
@@ -63,7 +62,7 @@ class _BetweenSlides(TwoFlanges):
         F = self._tension(at)
         return {"flange_a": F, "flange_b": -F}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"force": tension [N]}, negative if the flanges are pushed apart.
 
         Args:
@@ -71,15 +70,15 @@ class _BetweenSlides(TwoFlanges):
         """
         return {"force": self._tension(at)}
 
-    def _tension(self, at: Any) -> SX:
+    def _tension(self, at: At) -> SX:
         """Return the tension [N] that pulls the flanges together; negative if it pushes."""
         raise NotImplementedError
 
-    def _extent(self, at: Any) -> SX:
+    def _extent(self, at: At) -> SX:
         """Return x = position_b - position_a [m]."""
         return SX(at.flange_b.position - at.flange_a.position)
 
-    def _rate(self, at: Any) -> SX:
+    def _rate(self, at: At) -> SX:
         """Return dx/dt, the speed of flange_b minus that of flange_a [m/s]."""
         return SX(at.flange_b.speed - at.flange_a.speed)
 
@@ -103,7 +102,7 @@ class SlidingSpring(_BetweenSlides):
         TwoFlanges.__post_init__(self)
         self._require_effect("stiffness", "damping")
 
-    def energy(self, at: Any) -> SX:
+    def energy(self, at: At) -> SX:
         """Return stiffness (x - length)^2 / 2 [J].
 
         Args:
@@ -111,7 +110,7 @@ class SlidingSpring(_BetweenSlides):
         """
         return SX(0.5 * at.stiffness * (self._extent(at) - at.length) ** 2)
 
-    def dissipation(self, at: Any) -> SX:
+    def dissipation(self, at: At) -> SX:
         """Return damping (dx/dt)^2 [W].
 
         Args:
@@ -119,7 +118,7 @@ class SlidingSpring(_BetweenSlides):
         """
         return SX(at.damping * self._rate(at) ** 2)
 
-    def _tension(self, at: Any) -> SX:
+    def _tension(self, at: At) -> SX:
         """Return stiffness (x - length) + damping dx/dt [N]; negative if it pushes."""
         stretch = self._extent(at) - at.length
         return SX(at.stiffness * stretch + at.damping * self._rate(at))
@@ -134,7 +133,7 @@ class SlidingDamper(_BetweenSlides):
 
     damping = custom.parameter("N.s/m", min=0)
 
-    def dissipation(self, at: Any) -> SX:
+    def dissipation(self, at: At) -> SX:
         """Return damping (dx/dt)^2 [W].
 
         Args:
@@ -142,7 +141,7 @@ class SlidingDamper(_BetweenSlides):
         """
         return SX(at.damping * self._rate(at) ** 2)
 
-    def _tension(self, at: Any) -> SX:
+    def _tension(self, at: At) -> SX:
         """Return damping dx/dt [N]; positive if the flanges move apart."""
         return SX(at.damping * self._rate(at))
 
@@ -170,7 +169,7 @@ class ElastoGap(_BetweenSlides):
     damping = custom.parameter("N.s/m", 0.0, min=0)
     width = custom.parameter("m", _TOUCH, positive=True)
 
-    def energy(self, at: Any) -> SX:
+    def energy(self, at: At) -> SX:
         """Return the energy of the contact spring [J]; zero without contact.
 
         Args:
@@ -178,7 +177,7 @@ class ElastoGap(_BetweenSlides):
         """
         return SX(at.stiffness * self._contact(at)[2])
 
-    def dissipation(self, at: Any) -> SX:
+    def dissipation(self, at: At) -> SX:
         """Return the power dissipated by the damper [W]; zero without contact.
 
         Args:
@@ -186,11 +185,11 @@ class ElastoGap(_BetweenSlides):
         """
         return SX(self._tensions(at)[1] * self._rate(at))
 
-    def _tension(self, at: Any) -> SX:
+    def _tension(self, at: At) -> SX:
         """Return the tension of spring and damper [N], never positive."""
         return sum(self._tensions(at), SX(0))
 
-    def _tensions(self, at: Any) -> tuple[SX, SX]:
+    def _tensions(self, at: At) -> tuple[SX, SX]:
         """Return the tensions of spring and damper [N]; both zero without contact.
 
         The tension of the spring is negative in contact: the spring pushes the parts apart.
@@ -199,7 +198,7 @@ class ElastoGap(_BetweenSlides):
         spring = at.stiffness * ramped
         return -spring, one_sided_damping(at.damping * slope * self._rate(at), spring)
 
-    def _contact(self, at: Any) -> tuple[SX, SX, SX]:
+    def _contact(self, at: At) -> tuple[SX, SX, SX]:
         """Return (slope, ramp [m], integral of the ramp [m^2]) of `smooth_ramp` at the depth.
 
         All are zero without contact.
@@ -227,7 +226,7 @@ class SlidingBrake(BrakingForce):
     engagement = custom.input()
     force = custom.output("N")
 
-    def _effort(self, at: Any) -> SX:
+    def _effort(self, at: At) -> SX:
         """Return the smooth friction force of the brake [N], with the sign of the speed."""
         return friction_of(at, at.flange.speed)
 

@@ -205,13 +205,15 @@ def implicit(system: System, form: str, constrained: ConstraintRows | None = Non
         system,
         states=(casadi.vertcat(q, v, system.z), casadi.vertcat(a, lam, mu), u),
         ode=casadi.vertcat(position_rate(system.tree, q, speed), a, rates),
-        alg=casadi.vertcat(needed - tau - casadi.mtimes(rows.J.T, lam), _keep(rows, form)),
+        alg=casadi.vertcat(
+            needed - tau - casadi.mtimes(rows.J.T, lam), _kept_residuals(rows, form)
+        ),
         invariants=casadi.vertcat(rows.positions, rows.velocities, rows.norms),
         motion=(q, v),
     )
 
 
-def _keep(rows: Rows, form: str) -> SX:
+def _kept_residuals(rows: Rows, form: str) -> SX:
     """Return the constraint residuals that are algebraic equations in a form of the DAE."""
     match form:
         case "index1":
@@ -404,7 +406,7 @@ def elements_of(
     v_a = tuple(v[k] for k in system.active)
     phi, slips = (a + b for a, b in zip(_rows(system), standing, strict=True))
     rows = phi + slips
-    speeds = _of("der", rows, RATE_UNIT)
+    speeds = _named_rows("der", rows, RATE_UNIT)
     explicit = {
         "open": (q + v, norms),
         "closed form": (tuple(q[k] for k in system.active) + v_a, ()),
@@ -415,16 +417,16 @@ def elements_of(
         x, invariants = explicit[form]
         return {**fixed, "x": x + own, "z": (), "alg": (), "invariants": invariants}
     kept = {
-        "index1": _of("der(der", rows, _RATE_OF_RATE, "))"),
+        "index1": _named_rows("der(der", rows, _RATE_OF_RATE, "))"),
         "index2": speeds,
-        "index3": phi + _of("der", slips, RATE_UNIT),
+        "index3": phi + _named_rows("der", slips, RATE_UNIT),
         "ggl": phi + speeds,
     }[form]
-    mu = _of("mu", phi, dict.fromkeys(RATE_UNIT, "1")) if form == "ggl" else ()
+    mu = _named_rows("mu", phi, dict.fromkeys(RATE_UNIT, "1")) if form == "ggl" else ()
     return {
         **fixed,
         "x": q + v + own,
-        "z": a + _of("lam", rows, _EFFORT) + mu,
+        "z": a + _named_rows("lam", rows, _EFFORT) + mu,
         "alg": tau + kept,
         "invariants": phi + speeds + norms,
     }
@@ -442,7 +444,7 @@ def _coordinates(system: System) -> tuple[Elements, Elements, Elements, Elements
 def _rows(system: System) -> tuple[Elements, Elements]:
     """Return (name, unit) of the independent position and velocity constraints of the loops.
 
-    Velocity constraints have the unit of their integral; `_of` applies the unit of its rate.
+    Velocity constraints have the unit of their integral; `_named_rows` applies that of the rate.
     """
     if system.closure is None:
         return (), ()
@@ -459,7 +461,7 @@ def _rows(system: System) -> tuple[Elements, Elements]:
     return tuple(positions[k] for k in kept.rows), tuple(slips[k] for k in kept.slips)
 
 
-def _of(what: str, rows: Elements, unit: Mapping[str, str], end: str = ")") -> Elements:
+def _named_rows(what: str, rows: Elements, unit: Mapping[str, str], end: str = ")") -> Elements:
     """Return constraint rows (name, unit) with names "what(name)" and converted units.
 
     Args:
@@ -575,8 +577,8 @@ def dae(
     tau = start_efforts(system, tau0)
     z = by_name(system, "states", own, system.states, system.z_start)
     u = by_name(system, "inputs", inputs, system.inputs, system.u_default)
-    kind = _kind(system, form, q, p)
-    equations, elements = _built(system, kind)
+    kind = _kind_of_form(system, form, q, p)
+    equations, elements = _built_equations(system, kind)
     parts = {field.name: getattr(equations, field.name) for field in fields(equations)}
     x0 = np.concatenate([_start_states(system, kind[0], q, v), z])
     z0 = _start_algebraic(system, (q, v, tau, z, u, p), equations.z.numel())
@@ -588,7 +590,7 @@ _Kind = tuple[str, tuple[str, ...]]
 """Form, with "reduced" resolved into "open", "closed form" or "carried", and branch labels."""
 
 
-def _kind(system: System, form: str, q: Array, p: Array) -> _Kind:
+def _kind_of_form(system: System, form: str, q: Array, p: Array) -> _Kind:
     """Return the kind of equations that a requested DAE form needs, and branch labels.
 
     Args:
@@ -603,7 +605,7 @@ def _kind(system: System, form: str, q: Array, p: Array) -> _Kind:
     if not system.is_closed:
         return "open", ()
     slips = bool(system.closure and system.closure.slips)
-    if slips or system.nq != system.nv or _winds(system):
+    if slips or system.nq != system.nv or _angle_turns_matter(system):
         return "carried", ()
     try:
         return "closed form", _branch(system, q, p)
@@ -611,7 +613,7 @@ def _kind(system: System, form: str, q: Array, p: Array) -> _Kind:
         return "carried", ()
 
 
-def _winds(system: System) -> bool:
+def _angle_turns_matter(system: System) -> bool:
     """Return whether a full revolution of some passive joint changes efforts or couplings.
 
     Closed forms of loops return angles modulo 2 pi, so that they are not valid then.
@@ -650,10 +652,10 @@ def _branch(system: System, q: Array, p: Array) -> tuple[str, ...]:
     return tuple(label for label in labels if label)
 
 
-def _built(system: System, kind: _Kind) -> tuple[DaeEquations, Mapping[str, Elements]]:
+def _built_equations(system: System, kind: _Kind) -> tuple[DaeEquations, Mapping[str, Elements]]:
     """Return the equations of a kind, and (name, unit) of the elements of their vectors.
 
-    `kind` is a result of `_kind`. The equations are cached.
+    `kind` is a result of `_kind_of_form`. The equations are cached.
     """
 
     def build() -> tuple[DaeEquations, Mapping[str, Elements]]:
@@ -698,7 +700,7 @@ def start_efforts(system: System, tau0: Values) -> Array:
 def _start_states(system: System, form: str, q: Array, v: Array) -> Array:
     """Return the initial states of a form from q (nq,) and v (nv,), without component states.
 
-    `form` is the first element of the result of `_kind`.
+    `form` is the first element of the result of `_kind_of_form`.
     """
     active = list(system.active)
     if form == "closed form":

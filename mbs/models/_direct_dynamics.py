@@ -248,7 +248,11 @@ def require_inertia(system: System) -> None:
     def check() -> bool:
         if any(p.default is None for p in system.parameters):
             return True
-        loose = _loose_in_loops(system) if system.is_closed else _loose_in_tree(system)
+        loose = (
+            _without_inertia_in_loops(system)
+            if system.is_closed
+            else _without_inertia_in_tree(system)
+        )
         if loose is not None:
             number = system.active[loose]
             name = system.speeds[number].name
@@ -262,7 +266,7 @@ def require_inertia(system: System) -> None:
     system.cached("has inertia", check)
 
 
-def _loose_in_tree(system: System) -> int | None:
+def _without_inertia_in_tree(system: System) -> int | None:
     """Return the index in v of a velocity that moves no inertia, or None.
 
     The joints of descendants are free to move.
@@ -279,7 +283,7 @@ def _loose_in_tree(system: System) -> int | None:
     return None if moves.all() else int(np.max(np.flatnonzero(~moves)))
 
 
-def _loose_in_loops(system: System) -> int | None:
+def _without_inertia_in_loops(system: System) -> int | None:
     """Return the index in `system.active` of a velocity that moves no inertia, or None."""
     closure, q = system.closure, list(system.configuration)
     assert closure is not None
@@ -322,7 +326,7 @@ def hybrid_dynamics(system: System, prescribed: Sequence[str]) -> Function:
             independently.
     """
     require_system(system)
-    numbers = _numbers(system, prescribed)
+    numbers = _prescribed_indices(system, prescribed)
 
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, "tree")
@@ -336,7 +340,7 @@ def hybrid_dynamics(system: System, prescribed: Sequence[str]) -> Function:
     return model_function(system, ("hybrid", numbers), build)
 
 
-def _numbers(system: System, prescribed: Sequence[str]) -> tuple[int, ...]:
+def _prescribed_indices(system: System, prescribed: Sequence[str]) -> tuple[int, ...]:
     """Return the indices in v of the prescribed velocities.
 
     Raise ModelError if a name is unknown or repeated, or the loops tie the velocities.

@@ -73,11 +73,11 @@ def weld_wrench(
     motions = link_accelerations(system.tree, s.poses, s.v_tree, a, around.base)
     motion = motions[link] if link >= 0 else around.base
     total = inertial_wrench(PseudoInertia.of(part.inertia), motion)
-    total = add_wrenches(total, (zeros(), _spin(system, part, s.v_tree, a, motion)))
+    total = add_wrenches(total, (zeros(), _rotor_momentum_rate(system, part, s.v_tree, a, motion)))
     elements = element_wrenches(PartsAt(system, s.q, s.v_tree), held=part.ports)
-    exerted = [elements.get(link), _outside(system, part, around).get(link)]
+    exerted = [elements.get(link), _external_wrenches(system, part, around).get(link)]
     exerted += [
-        _on_joint(system, s.q, row, link, side, others[row.name])
+        _wrench_on_joint(system, s.q, row, link, side, others[row.name])
         for row in system.joints
         for side in "ab"
         if row.name in others and (row.name, side) in part.ports
@@ -89,7 +89,9 @@ def weld_wrench(
     return part.sign * f, part.sign * m
 
 
-def _on_joint(system: System, q: SX, row: JointRow, link: int, side: str, wrench: Wrench) -> Wrench:
+def _wrench_on_joint(
+    system: System, q: SX, row: JointRow, link: int, side: str, wrench: Wrench
+) -> Wrench:
     """Return the wrench that a body exerts on a joint, about and in the frame of its link `link`.
 
     The body is on `side` "a" or "b". `wrench` is the joint wrench on the body of frame_b, about and
@@ -101,7 +103,9 @@ def _on_joint(system: System, q: SX, row: JointRow, link: int, side: str, wrench
     return sign * f, sign * m
 
 
-def _outside(system: System, part: WeldedPart, around: ExternalForces) -> dict[int, Wrench]:
+def _external_wrenches(
+    system: System, part: WeldedPart, around: ExternalForces
+) -> dict[int, Wrench]:
     """Return the wrenches f_ext that the bodies of a part exert on their environment, by link."""
     f_ext = dict(around.inputs).get("f_ext")
     if f_ext is None:
@@ -110,7 +114,9 @@ def _outside(system: System, part: WeldedPart, around: ExternalForces) -> dict[i
     return wrenches_on_links(system, casadi.mtimes(f_ext, casadi.diag(keep)))
 
 
-def _spin(system: System, part: WeldedPart, v: SX, a: SX, motion: Acceleration) -> SX:
+def _rotor_momentum_rate(
+    system: System, part: WeldedPart, v: SX, a: SX, motion: Acceleration
+) -> SX:
     """Return the rate of the angular momentum of the rotors on a part, (3, 1), in its link frame.
 
     `motion` is the motion of the link.
@@ -222,7 +228,9 @@ def wrenches_of_joints(
         loads.append(part_wrenches(system, s.q, lam))
     through = transmitted_wrenches(system.tree, s.poses, sum_wrenches(*loads))
     between = {
-        joint.name: cut[joint.name] if joint.cut else _at_frame_b(system.tree, s.q, joint, through)
+        joint.name: cut[joint.name]
+        if joint.cut
+        else _wrench_at_frame_b(system.tree, s.q, joint, through)
         for joint in system.joints
         if joint.part is None
     }
@@ -312,7 +320,7 @@ def closure_efforts(
     return every
 
 
-def _at_frame_b(tree: Tree, q: SX, joint: JointRow, through: list[Wrench]) -> Wrench:
+def _wrench_at_frame_b(tree: Tree, q: SX, joint: JointRow, through: list[Wrench]) -> Wrench:
     """Return the wrench of a tree joint on the body of frame_b, about and in frame_b.
 
     Args:

@@ -212,7 +212,7 @@ def linearise(
     require_system(system)
     if mode is None:
         require_no_contacts(system, "linearise without mode=")
-    modes = _modes(system, values_given(f"{system.name}: mode", mode, '"clutch": 0'))
+    modes = _mode_numbers(system, values_given(f"{system.name}: mode", mode, '"clutch": 0'))
     known = _output_units(system)
     names = list(known)[: system.nq + system.nv]
     if outputs is not None:
@@ -234,7 +234,7 @@ def linearise(
     def held() -> tuple[Named, Named]:
         s = symbols_of(system)
         tau = SX.sym("tau", system.nv)
-        found = _contact(system, s, tau + part_equations(system, s.q, s.v_tree)[0], modes)
+        found = _contact_in_modes(system, s, tau + part_equations(system, s.q, s.v_tree)[0], modes)
         assert found is not None
         contact, (positive, stuck) = found
         still = stuck * contact.state.velocity
@@ -248,7 +248,7 @@ def linearise(
     words: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
     if modes:
         holds = model_function(system, ("holds", *modes), held, check)
-        words = _words(system)
+        words = _condition_texts(system)
     free = [system.speeds[k] for k in system.free]
     active = [system.speeds[k] for k in system.active]
     x = [(f"{row.name}.q", row.unit.removesuffix("/s")) for row in free]
@@ -266,7 +266,7 @@ def linearise(
     )
 
 
-def _modes(system: System, mode: Mapping[str, float]) -> tuple[float, ...]:
+def _mode_numbers(system: System, mode: Mapping[str, float]) -> tuple[float, ...]:
     """Return the 2 k modes of the k contact rows: limits, then directions of sliding.
 
     `mode` is given by name; other modes are 0. Raise ModelError for unknown names or other values.
@@ -286,7 +286,7 @@ def _modes(system: System, mode: Mapping[str, float]) -> tuple[float, ...]:
     return tuple(float(mode.get(x.name, 0)) if x else 0.0 for x in elements)
 
 
-def _words(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _condition_texts(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return descriptions of the elements of `zero` and `positive` of `holds`, for messages."""
     contacts = contacts_of(system)
     still = [f"the velocity on which {name} acts" for name in contacts.names]
@@ -301,7 +301,7 @@ def _words(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return tuple(still), tuple(f"{name} {told[kind]}" for kind in KINDS for name in contacts.names)
 
 
-def _contact(
+def _contact_in_modes(
     system: System, s: ModelSymbols, tau: SX, modes: Sequence[float]
 ) -> tuple[ContactEquations, tuple[SX, SX]] | None:
     """Return the contact equations with the mode symbols replaced by the numbers `modes`.
@@ -343,7 +343,7 @@ def _matrices(
     motor_efforts = efforts[: efforts.numel() - system.u.numel()]
     every = tau + given
     # the independent accelerations
-    contact = _contact(system, s, every, modes)
+    contact = _contact_in_modes(system, s, every, modes)
     if contact is None:
         pushed = s.reduced_effort(every) if s.reduction is not None else every
         (a_a,) = outputs_of(system, independent_dynamics(system), q, v_a, pushed)
@@ -354,9 +354,9 @@ def _matrices(
     # position change dq = T dxi for small displacements xi of the free coordinates
     speed = SX.sym("v", system.nv)
     N = casadi.jacobian(position_rate(system.tree, q, speed), speed)
-    T = casadi.mtimes(N, _tangents(system, q))
+    T = casadi.mtimes(N, _free_tangents(system, q))
     rate = position_rate(system.tree, q, v)
-    back = _selected(system, N)
+    back = _left_inverse(system, N)
     # T' xi + T xi' = d(rate)/dq T xi + d(rate)/dv_a dv_a, projected on the free coordinates
     turning = casadi.jtimes(casadi.vec(T), q, rate)
     A11 = casadi.mtimes(
@@ -387,7 +387,7 @@ def _matrices(
     )
 
 
-def _tangents(system: System, q: SX) -> SX:
+def _free_tangents(system: System, q: SX) -> SX:
     """Return tree velocities (nv, m) for unit rates of the free coordinates, with closed loops."""
     free = list(system.free)
     if system.closure is None:
@@ -406,7 +406,7 @@ def _tangents(system: System, q: SX) -> SX:
     return T
 
 
-def _selected(system: System, N: SX) -> SX:
+def _left_inverse(system: System, N: SX) -> SX:
     """Return a left inverse (m, nq) of N: maps dq/dt to the rates of the m free coordinates."""
     # columns of N are orthogonal; the columns of a quaternion have the squared length 1/4
     sizes = casadi.sum1(N * N)

@@ -183,13 +183,13 @@ def _observed(
     )
 
 
-def _on_frames(state: _Observed, attached: AttachedSensor) -> Readings:
+def _frame_signals(state: _Observed, attached: AttachedSensor) -> Readings:
     """Return the signals of a sensor of frame motion, or of a distance of frames, by name."""
     tree = state.system.tree
     return frame_readings(tree, attached, state.s.q, state.velocities, state.accelerations)
 
 
-def _coordinate(state: _Observed, attached: AttachedSensor) -> Readings:
+def _coordinate_signals(state: _Observed, attached: AttachedSensor) -> Readings:
     """Return position, velocity and acceleration of the coordinate of a sensor, by name."""
     system, s, name = state.system, state.s, attached.coordinate
     if attached.frames:
@@ -217,7 +217,7 @@ def _cut_rotation(state: _Observed, attached: AttachedSensor) -> Readings:
     return {"v": w[number], "a": wd[number]}
 
 
-def _transmitted(state: _Observed, attached: AttachedSensor) -> Readings:
+def _joint_load(state: _Observed, attached: AttachedSensor) -> Readings:
     """Return the force f and moment m that a joint transmits, in the axes of its sensor."""
     assert attached.joint is not None
     f, m = state.wrenches[attached.joint]
@@ -234,8 +234,8 @@ def _power(state: _Observed, attached: AttachedSensor) -> Readings:
 
 
 _READ: dict[str, Callable[[_Observed, AttachedSensor], Readings]] = {
-    **dict.fromkeys(("absolute", "relative", "distance"), _on_frames),
-    "coordinate": _coordinate,
-    "wrench": _transmitted,
+    **dict.fromkeys(("absolute", "relative", "distance"), _frame_signals),
+    "coordinate": _coordinate_signals,
+    "wrench": _joint_load,
     "power": _power,
 }

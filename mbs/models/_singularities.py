@@ -58,7 +58,7 @@ def total(a: Polynomial, b: Polynomial, sign: int = 1) -> Polynomial:
     result = dict(a)
     for monomial, coefficient in b.items():
         _add(result, monomial, sign * coefficient)
-    return _within_reason({m: c for m, c in result.items() if c})
+    return _require_few_terms({m: c for m, c in result.items() if c})
 
 
 def product(a: Polynomial, b: Polynomial) -> Polynomial:
@@ -72,7 +72,7 @@ def product(a: Polynomial, b: Polynomial) -> Polynomial:
     for m, x in a.items():
         for n, y in b.items():
             _add(result, _join(m, n), x * y)
-    return _within_reason({m: c for m, c in result.items() if c})
+    return _require_few_terms({m: c for m, c in result.items() if c})
 
 
 def _add(result: Polynomial, monomial: Monomial, coefficient: Fraction) -> None:
@@ -91,7 +91,7 @@ def _join(m: Monomial, n: Monomial) -> Monomial:
     return tuple(sorted(powers.items()))
 
 
-def _within_reason(polynomial: Polynomial) -> Polynomial:
+def _require_few_terms(polynomial: Polynomial) -> Polynomial:
     """Return a polynomial; raise NotTrigonometric if it has too many terms."""
     if len(polynomial) > _MOST_TERMS:
         raise NotTrigonometric
@@ -114,11 +114,13 @@ def polynomial_of(expression: SX, variables: SX) -> Polynomial:
     least = _CONSTANT_ROUNDING * max((abs(node.value) for node in graph.nodes), default=0.0)
     values: list[Polynomial] = []
     for number in range(len(graph.nodes)):
-        values.append(lowered(_value(graph, number, values, least), "s"))
+        values.append(lowered(_node_polynomial(graph, number, values, least), "s"))
     return values[graph.results[0][0]]
 
 
-def _value(graph: Graph, number: int, values: list[Polynomial], least: float) -> Polynomial:
+def _node_polynomial(
+    graph: Graph, number: int, values: list[Polynomial], least: float
+) -> Polynomial:
     """Return the polynomial of node `number` of an expression graph.
 
     Args:
@@ -543,7 +545,7 @@ def _constant_and_factors(
     values: dict[str, SX] = {}
     assert square.blocks is not None
     for block, det in zip(square.blocks, square.determinants(), strict=True):
-        parts = _parts(system, block, det, variables)
+        parts = _block_factors(system, block, det, variables)
         if parts is None:
             label = _label(chosen, block)
             powers[label], values[label] = 1, det
@@ -563,7 +565,7 @@ def _constant_and_factors(
     return _product_text(number, constants), factors
 
 
-def _parts(system: System, block: Block, det: SX, variables: SX) -> Factored | None:
+def _block_factors(system: System, block: Block, det: SX, variables: SX) -> Factored | None:
     """Return the factors of the determinant of a block in `variables`, checked at random points.
 
     None if the block is too large or the check fails.

@@ -419,12 +419,12 @@ def _contacts(system: System) -> Contacts:
             seen = at.at(part)
             laws = [*part.element.stops(seen).items(), *part.element.frictions(seen).items()]
             for label, law in laws:
-                _require_unread(system, part)
+                _require_no_wrench_sensor(system, part)
                 element = ContactElement(part, label, law, effort_unit(part, law))
                 _collect(system, found, element, q, v)
     found.sort(key=lambda row: system.nv if row.number is None else row.number)
     stops, frictions = (tuple(getattr(row, x) for row in found) for x in ("stop", "friction"))
-    measures = [_measure(row) for row in found]
+    measures = [_gap_or_velocity(row) for row in found]
     rows = SX(casadi.vertcat(SX(0, system.nv), *(row.E for row in found)))
     velocity = _stack(row.velocity for row in found)
     return Contacts(
@@ -435,17 +435,17 @@ def _contacts(system: System) -> Contacts:
         velocities=tuple(row.number for row in found),
         positions=tuple(_index(measure, q) for measure in measures),
         groups=tuple([row.key for row in found].index(row.key) for row in found),
-        levers=_levers(system, found, rows, q),
+        levers=_largest_jacobian(system, found, rows, q),
         stops=stops,
         frictions=frictions,
-        bounds=(_column(stops, "lower"), _column(stops, "upper")),
+        bounds=(_law_column(stops, "lower"), _law_column(stops, "upper")),
         has_lower=DM([float(x is not None and x.sides[0]) for x in stops]),
         has_upper=DM([float(x is not None and x.sides[1]) for x in stops]),
         has_friction=DM([float(x is not None) for x in frictions]),
         has_gap=DM([float(x is not None and isinstance(x.law, Stop)) for x in stops]),
-        restitution=_column(stops, "restitution"),
-        rest_speed=_column(stops, "rest_speed"),
-        anchors=tuple(_anchor(system, row, q, v) for row in found),
+        restitution=_law_column(stops, "restitution"),
+        rest_speed=_law_column(stops, "rest_speed"),
+        anchors=tuple(_row_integral(system, row, q, v) for row in found),
         q=q,
         v=v,
         state=ContactState(
@@ -453,8 +453,8 @@ def _contacts(system: System) -> Contacts:
             velocity=velocity,
             bias=SX(casadi.densify(casadi.jtimes(velocity, q, position_rate(system.tree, q, v)))),
             measure=_stack(SX(0) if x is None else x for x in measures),
-            sliding=_column(frictions, "limit"),
-            sticking=_column(frictions, "sticking", "limit"),
+            sliding=_law_column(frictions, "limit"),
+            sticking=_law_column(frictions, "sticking", "limit"),
         ),
     )
 
@@ -523,7 +523,7 @@ def contact_velocity(system: System, law: Friction | Stop | OneWay, q: SX, v: SX
     return SX(law.slip if isinstance(law, Friction) else law.velocity)
 
 
-def _levers(system: System, found: Sequence[_ContactRow], rows: SX, q: SX) -> Array:
+def _largest_jacobian(system: System, found: Sequence[_ContactRow], rows: SX, q: SX) -> Array:
     """Return the largest absolute elements (k, nv) of the contact rows over configurations.
 
     These are the assembled configuration and random ones. `rows` are the rows at the symbols q.
@@ -545,7 +545,7 @@ def _levers(system: System, found: Sequence[_ContactRow], rows: SX, q: SX) -> Ar
     return levers
 
 
-def _measure(row: _ContactRow) -> SX | None:
+def _gap_or_velocity(row: _ContactRow) -> SX | None:
     """Return the gap of a stop or the velocity of a freewheel in a row; None without either."""
     if row.stop is None:
         return None
@@ -561,7 +561,7 @@ def _index(value: SX | None, q: SX) -> int | None:
     return next((k for k, x in enumerate(elements) if casadi.is_equal(x, value)), None)
 
 
-def _anchor(system: System, row: _ContactRow, q: SX, v: SX) -> SX | None:
+def _row_integral(system: System, row: _ContactRow, q: SX, v: SX) -> SX | None:
     """Return an expression whose rate is the velocity of a contact row; None if unknown."""
     if row.stop is not None and isinstance(row.stop.law, Stop):
         return SX(row.stop.law.gap)
@@ -575,7 +575,7 @@ def _anchor(system: System, row: _ContactRow, q: SX, v: SX) -> SX | None:
     return sum((row.E[0, k] * q[x.q.start + k - x.v.start] for k, x in moved), SX(0))
 
 
-def _require_unread(system: System, part: ComponentInstance) -> None:
+def _require_no_wrench_sensor(system: System, part: ComponentInstance) -> None:
     """Raise ModelError if a sensor measures joint wrenches and `part` has contacts on points."""
     for attached in system.sensors if part.frames else ():
         if attached.joint is not None:
@@ -591,7 +591,7 @@ def _stack(values: Iterable[SX]) -> SX:
     return SX(casadi.densify(casadi.vertcat(SX(0, 1), *values)))
 
 
-def _column(elements: Sequence[ContactElement | None], *names: str) -> SX:
+def _law_column(elements: Sequence[ContactElement | None], *names: str) -> SX:
     """Return (k, 1) of the first field in `names` of each law that is not None; 0 without a law."""
     values = []
     for element in elements:

@@ -183,7 +183,7 @@ def modes_of(name: str, points: Sequence[ContactPoint], touching: Touching) -> t
         ModelError: a point is unknown or repeated, or its mode is unknown.
     """
     names = [point.name for point in points]
-    given = _ways_by_name(name, touching)
+    given = _modes_by_name(name, touching)
     for point, mode in given.items():
         if point not in names:
             raise ModelError(
@@ -198,7 +198,7 @@ def modes_of(name: str, points: Sequence[ContactPoint], touching: Touching) -> t
     return tuple(given.get(point, "") for point in names)
 
 
-def _ways_by_name(name: str, touching: Touching) -> dict[str, str]:
+def _modes_by_name(name: str, touching: Touching) -> dict[str, str]:
     """Return the mode of each touching point by name; "fixed" if no mode is given.
 
     Raise ModelError, with the mechanism `name`, if a point is repeated.
@@ -229,13 +229,13 @@ def friction_cone(name: str, points: Sequence[ContactPoint], sides: int | None) 
         )
     f = SX.sym("f", 3, len(points))
     margins = [
-        casadi.vertcat(f[2, k], _slip(f[:, k], point.friction, sides))
+        casadi.vertcat(f[2, k], _cone_margin(f[:, k], point.friction, sides))
         for k, point in enumerate(points)
     ]
     return Function("cone", [f], [casadi.densify(casadi.vertcat(*margins))], ["f"], ["margin"])
 
 
-def _slip(f: SX, friction: float | None, sides: int | None) -> SX:
+def _cone_margin(f: SX, friction: float | None, sides: int | None) -> SX:
     """Return the margin of a contact force f (3, 1) to its friction cone.
 
     With a pyramid, it is one margin per side. Empty (0, 1) without a friction coefficient.
@@ -344,9 +344,9 @@ class Standing:
             p: (np,) parameters.
         """
         constrained, loops = self.constrained, kept_rows(self.system)
-        numbers = _numbers(self)
+        numbers = _phase_terms(self)
         matrices = []
-        for configuration in self._near(q, p):
+        for configuration in self._nearby_closed(q, p):
             _, _, J_loops, _, J, _ = (np.array(x) for x in numbers(configuration, 0 * q[:1], p))
             matrices.append(np.vstack([J_loops[loops], J[constrained]]))
         ranks = [rank(matrix) for matrix in matrices]
@@ -355,10 +355,10 @@ class Standing:
         chosen = independent_rows(best, max(ranks), first)
         return tuple(constrained[k - len(loops)] for k in chosen if k >= len(loops))
 
-    def _near(self, q: Array, p: Array) -> Iterator[Array]:
+    def _nearby_closed(self, q: Array, p: Array) -> Iterator[Array]:
         """Yield q (nq,), then nearby configurations that satisfy the contacts and the loops."""
         yield q
-        rng, function = np.random.default_rng(_SEED), _touching(self)
+        rng, function = np.random.default_rng(_SEED), _touch_residuals(self)
 
         def residual(x: Array) -> tuple[Array, Array]:
             return _pair(function(x, p))
@@ -384,14 +384,14 @@ class Standing:
         q0 = system.plain_names({} if begin.q0 is None else begin.q0, POSITIONS)
         given = q0 if isinstance(q0, Mapping) else names
         free = [k for k, name in enumerate(names) if name not in given]
-        function = _touching(self)
+        function = _touch_residuals(self)
 
         def residual(x: Array) -> tuple[Array, Array]:
-            r, J = _pair(function(_with(q, free, x), p))
+            r, J = _pair(function(_with_values(q, free, x), p))
             return r, J[:, free]
 
         if free:
-            q = _with(q, free, gauss_newton(residual, q[free]).x)
+            q = _with_values(q, free, gauss_newton(residual, q[free]).x)
         missing = _pair(function(q, p))[0]
         if np.abs(missing).max(initial=0) > _OFF:
             raise Unclosable(
@@ -406,7 +406,7 @@ class Standing:
 
         v0 are velocities by name or all of them. Raise ModelError if they are not possible.
         """
-        _, _, J_loops, _, J, _ = (np.array(x) for x in _numbers(self)(q, np.zeros(1), p))
+        _, _, J_loops, _, J, _ = (np.array(x) for x in _phase_terms(self)(q, np.zeros(1), p))
         rows = np.vstack([J_loops, J[self.constrained]])
         v, missed = smallest_velocity(self.system, rows, v0)
         if missed:
@@ -434,7 +434,7 @@ class Standing:
         q, v = motion
         distances, drifts = split(kept)
         s = len(self.system.closure.rows) if self.system.closure else 0
-        A, H, J_loops, psi, J, bias = (np.array(x) for x in _numbers(self)(q, v, p))
+        A, H, J_loops, psi, J, bias = (np.array(x) for x in _phase_terms(self)(q, v, p))
         loops = kept_rows(self.system)
         J_loops, psi = J_loops[loops], psi[loops]
         rows = np.vstack([J_loops[:s], J[distances], J_loops[s:], J[drifts]])
@@ -462,7 +462,7 @@ def split(kept: tuple[int, ...]) -> tuple[list[int], list[int]]:
     return [k for k in kept if k % 3 == 2], [k for k in kept if k % 3 != 2]
 
 
-def _numbers(standing: Standing) -> Function:
+def _phase_terms(standing: Standing) -> Function:
     """Return ``numbers(q, v, p) -> A, H, J_loops, psi, J, bias``, with all rows.
 
     Outputs: mass matrix, bias efforts, Jacobian and acceleration bias of loops and of points.
@@ -500,7 +500,7 @@ def with_starts(system: System, values: Sequence[SX]) -> list[SX]:
     return [SX(value) for value in casadi.substitute(list(values), [signals], [numbers])]
 
 
-def _touching(standing: Standing) -> Function:
+def _touch_residuals(standing: Standing) -> Function:
     """Return ``touching(q, p) -> r, J``: residuals of contacts, quaternions and loops.
 
     r is zero if the points touch, quaternions have unit norm and loops close. J is dr/dq.
@@ -527,7 +527,7 @@ def _pair(results: Any) -> tuple[Array, Array]:
     return np.array(r).ravel(), np.array(J)
 
 
-def _with(q: Array, places: list[int], values: Array) -> Array:
+def _with_values(q: Array, places: list[int], values: Array) -> Array:
     """Return a copy of q with `values` at the indices `places`."""
     result = q.copy()
     result[places] = values
@@ -611,7 +611,7 @@ def _built(standing: Standing, explicit: Function, form: str, kept: tuple[int, .
     def build() -> _Built:
         names = standing.elements(kept)
         if form == "reduced":
-            made, f = _explicit(standing, explicit, kept)
+            made, f = _explicit_equations(standing, explicit, kept)
             return made, f, elements_of(system, "phase", names)
         made = implicit(system, form, standing.rows(kept))
         return made, _forces(standing, kept, made.z), elements_of(system, form, names)
@@ -621,7 +621,7 @@ def _built(standing: Standing, explicit: Function, form: str, kept: tuple[int, .
     return built
 
 
-def _explicit(
+def _explicit_equations(
     standing: Standing, explicit: Function, kept: tuple[int, ...]
 ) -> tuple[DaeEquations, SX]:
     """Return explicit equations of a phase (no z), and the forces f (3, n) of the planes.

@@ -234,7 +234,7 @@ def staged_accelerations(system: System, names: Sequence[str]) -> tuple[dict[str
     """
     solve = solve_column(velocity_antecedents(system.tree))
     order = [name for name in names if name != "tau"]
-    front = _front(system, order)
+    front = _first_stage(system, order)
     inputs = {name: MX.sym(name, front.size_in(name)) for name in front.name_in()}
     ratios, inverse, a, *right = front.call(list(inputs.values()))
     if "tau" in names:
@@ -249,7 +249,7 @@ def staged_accelerations(system: System, names: Sequence[str]) -> tuple[dict[str
     return inputs, [*(blocks[name] for name in names), a]
 
 
-def _front(system: System, names: Sequence[str]) -> Function:
+def _first_stage(system: System, names: Sequence[str]) -> Function:
     """Return the Function (q, v, tau) -> factors of A, accelerations, right-hand sides.
 
     The derivatives of the accelerations are the solutions for these right-hand sides.
@@ -312,7 +312,7 @@ def inverse_dynamics_derivatives(
             or the analytical method is requested in independent coordinates of a closed system.
     """
     require_system(system)
-    names = _checked(system, coordinates, with_respect_to, ("q", "v", "a", "z", "u", "p"))
+    names = _checked_names(system, coordinates, with_respect_to, ("q", "v", "a", "z", "u", "p"))
     _check_method(system, coordinates, method, ("auto", "ad", "analytical"))
 
     def build(chosen: str) -> Function:
@@ -329,7 +329,9 @@ def inverse_dynamics_derivatives(
         check = derivatives_check(system, coordinates)
         return model_function(system, key, symbols, check, TreeLoops(system, "idm_derivatives"))
 
-    candidates = ("ad",) if is_reduced(system, coordinates) else _compare(system, "analytical")
+    candidates = (
+        ("ad",) if is_reduced(system, coordinates) else _compared_methods(system, "analytical")
+    )
     return _choose(system, ("idm_derivatives", coordinates, names), method, build, candidates)
 
 
@@ -369,7 +371,7 @@ def direct_dynamics_derivatives(
             or tree coordinates are requested of a closed system; or a joint moves no inertia.
     """
     require_system(system)
-    names = _checked(system, coordinates, with_respect_to, ("q", "v", "tau", "z", "u", "p"))
+    names = _checked_names(system, coordinates, with_respect_to, ("q", "v", "tau", "z", "u", "p"))
     if coordinates == "tree" and system.is_closed:
         raise ModelError(
             f"{system.name}: ddm_derivatives of a closed system are in its independent"
@@ -390,16 +392,16 @@ def direct_dynamics_derivatives(
 
         key = ("ddm_derivatives", chosen, coordinates, names)
         if chosen == "implicit" and not system.is_closed and system.nv >= _STAGED:
-            staged: Function = system.cached(key, lambda: _stage(system, names))
+            staged: Function = system.cached(key, lambda: _mapped_derivatives(system, names))
             return staged
         check = derivatives_check(system, coordinates)
         return model_function(system, key, symbols, check, TreeLoops(system, "ddm_derivatives"))
 
-    candidates = ("implicit",) if system.is_closed else _compare(system, "implicit")
+    candidates = ("implicit",) if system.is_closed else _compared_methods(system, "implicit")
     return _choose(system, ("ddm_derivatives", coordinates, names), method, build, candidates)
 
 
-def _stage(system: System, names: tuple[str, ...]) -> Function:
+def _mapped_derivatives(system: System, names: tuple[str, ...]) -> Function:
     """Return ``ddm_derivatives`` of a large tree with mapped columns, for the inputs `names`."""
     inputs, outputs = staged_accelerations(system, names)
     labels = list(inputs), [*(f"da_d{name}" for name in names), "a"]
@@ -408,7 +410,7 @@ def _stage(system: System, names: tuple[str, ...]) -> Function:
     return ModelFunction(function, system, loops=TreeLoops(system, "ddm_derivatives"))
 
 
-def _checked(
+def _checked_names(
     system: System, coordinates: str, with_respect_to: Iterable[str], known: tuple[str, ...]
 ) -> tuple[str, ...]:
     """Return the names of the inputs of the requested derivatives, as a tuple.
@@ -453,7 +455,7 @@ def _check_method(system: System, coordinates: str, method: str, known: tuple[st
         )
 
 
-def _compare(system: System, recursive: str) -> tuple[str, ...]:
+def _compared_methods(system: System, recursive: str) -> tuple[str, ...]:
     """Return the methods that "auto" compares: `recursive`, and "ad" if branches are short."""
     behind: list[int] = []
     for link in system.tree.links:
@@ -508,7 +510,7 @@ def with_implicit_jacobian(system: System, ddm: Function) -> Function:
         ModelError: the system has loops, or ddm is not the forward dynamics of the system.
     """
     require_system(system)
-    _check(system, ddm)
+    _require_ddm(system, ddm)
     names, symbols, output = ddm.name_in(), ddm.sx_in(), ddm.name_out()[0]
     q = symbols[0]
     arguments = [normalised(system.tree, q), *symbols[1:]]
@@ -536,7 +538,7 @@ def with_implicit_jacobian(system: System, ddm: Function) -> Function:
     return made
 
 
-def _check(system: System, ddm: Function) -> None:
+def _require_ddm(system: System, ddm: Function) -> None:
     """Raise ModelError unless `ddm` is the direct dynamic model of this open chain."""
     if system.is_closed:
         raise ModelError(

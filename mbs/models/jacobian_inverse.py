@@ -140,8 +140,8 @@ def selection(
         moving = [system.tree.links[k].v for k in system.tree.path(link)]
         columns = [k for part in moving for k in range(part.start, part.stop)]
         columns = list(range(len(names))) if reduced else columns
-    kept = _numbers(system, "row", range(6) if rows is None else rows, _ROWS)
-    chosen = _numbers(system, "column", columns, names)
+    kept = _given_indices(system, "row", range(6) if rows is None else rows, _ROWS)
+    chosen = _given_indices(system, "column", columns, names)
     if len(kept) != len(chosen):
         raise ModelError(
             f"{system.name}: the selection of the Jacobian of {quoted(frame)} has {len(kept)} rows"
@@ -155,7 +155,7 @@ def selection(
     )
 
 
-def _numbers(
+def _given_indices(
     system: System, what: str, given: Iterable[Any], names: Sequence[str]
 ) -> tuple[int, ...]:
     """Return the indices of rows or columns given by name or index.

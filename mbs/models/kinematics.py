@@ -68,7 +68,7 @@ def jacobian(
     target, axes = system.frame(frame), system.frame(expressed_in)
     if form not in ("full", "renaud"):
         raise ModelError(f"{system.name}: form is {quoted(form)}; use 'full' or 'renaud'")
-    between = [_on_the_way(system, target[0], frame, k) for k in (intermediate, reference)]
+    between = [_tree_link(system, target[0], frame, k) for k in (intermediate, reference)]
 
     def full() -> tuple[Named, Named]:
         q = SX.sym("q", system.nq)
@@ -113,7 +113,7 @@ def in_coordinates(system: System, q: SX, J: SX, coordinates: str) -> SX:
     return J
 
 
-def _on_the_way(system: System, link: int, frame: str | int, number: int | None) -> int | None:
+def _tree_link(system: System, link: int, frame: str | int, number: int | None) -> int | None:
     """Return a link index of the user (0 is the base) as a tree index (-1 is the base).
 
     Raise ModelError if the link is not between the base and `link`, the link of the frame. None
@@ -195,7 +195,7 @@ def link_accelerations(
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)
         name, a = s.input("a")
-        base, extra = _base(moving_base)
+        base, extra = _base_motion(moving_base)
         motions = tree_accelerations(system.tree, s.poses, s.v_tree, s.tree_acceleration(a), base)
         columns = [casadi.vertcat(link.vd, link.wd) for link in motions]
         return [*_state(s), (name, a), *extra], [("Vd", casadi.horzcat(*columns))]
@@ -245,7 +245,7 @@ def jacobian_dot_velocity(
 
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)
-        base, extra = _base(moving_base)
+        base, extra = _base_motion(moving_base)
         a = s.tree_acceleration(SX.zeros(s.size))
         links = tree_accelerations(system.tree, s.poses, s.v_tree, a, base)
         motion = links[j] if j >= 0 else base
@@ -263,7 +263,7 @@ def _state(s: ModelSymbols) -> Named:
     return [("q", s.q), ("v" + s.suffix, s.v)]
 
 
-def _base(moves: bool) -> tuple[Acceleration, Named]:
+def _base_motion(moves: bool) -> tuple[Acceleration, Named]:
     """Return the motion of the base without gravity, and its inputs v_0 and a_0 if it moves."""
     if not moves:
         return resting_base(zeros()), []

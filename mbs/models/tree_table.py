@@ -111,14 +111,14 @@ class TreeLoops:
             return None
         table = table_of(system)
         shapes = shapes_of(system, table)
-        if _shape(shapes[name]) != _shape(function):
+        if _port_sizes(shapes[name]) != _port_sizes(function):
             return None
         names = [name] * value + [f"jac_{name}"] * jacobian
         files = tree_files(table, {x: shapes[x] for x in names})
         return LoopCode(files, COMMON, value, jacobian, jacobian and table.dependent is not None)
 
 
-def _shape(function: Function) -> list[object]:
+def _port_sizes(function: Function) -> list[object]:
     """Return the names and sizes of the inputs and outputs of a Function."""
     return [
         *((function.name_in(k), function.size_in(k)) for k in range(function.n_in())),
@@ -171,7 +171,7 @@ def table_of(system: System) -> TreeTable:
     """
     links = system.tree.links
     order = _depth_first(links)
-    lists = _lists(links, order)
+    lists = _index_lists(links, order)
     numbers = [0.0] * place_of(0, -(-system.nv // 8) * 8) + [0.0] * 3
     dependent: dict[int, SX] = {}
 
@@ -239,7 +239,7 @@ _KIND = {Motion.REVOLUTE: 0, Motion.PRISMATIC: 1, Motion.SPHERICAL: 2, Motion.FR
 first velocities but have the last codes."""
 
 
-def _lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:
+def _index_lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:
     """Return the index lists of the nodes of a tree by name, as declared in tree_core.h.
 
     `order` has the link indices in depth-first order.
@@ -253,7 +253,7 @@ def _lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:
         link, count = links[j], links[j].motion.nv
         i = link.antecedent
         first[j], last[j] = size, size + count - 1
-        ancestry[j] = _extended(ancestry[i], size, size + count)
+        ancestry[j] = _with_run(ancestry[i], size, size + count)
         for h in range(count):
             result["before"].append(size - 1 if h else last[i])
             result["link"].append(last[i])
@@ -284,7 +284,7 @@ def _lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:
     return result
 
 
-def _extended(runs: list[int], first: int, end: int) -> list[int]:
+def _with_run(runs: list[int], first: int, end: int) -> list[int]:
     """Return a flat list of runs with the run of nodes [first, end) appended.
 
     Adjacent ones merge.

@@ -304,9 +304,9 @@ class Builder:
             return rule(*operands)
         if all(self.nodes[a].op == casadi.OP_CONST for a in operands):
             return self._fold(op, operands)
-        if op in _ODD and self._is(operands[0], casadi.OP_NEG):
+        if op in _ODD and self._has_operation(operands[0], casadi.OP_NEG):
             return self.negative(self.apply(op, self.nodes[operands[0]].args[0]))
-        if op in _EVEN and self._is(operands[0], casadi.OP_NEG):
+        if op in _EVEN and self._has_operation(operands[0], casadi.OP_NEG):
             return self.apply(op, self.nodes[operands[0]].args[0])
         return self.node(op, operands)
 
@@ -432,7 +432,7 @@ class Builder:
     def _plain_sum(self, a: int, b: int) -> int:
         """Return the index of a + b for nodes without signs; x if they are x - y and y."""
         for one, other in ((a, b), (b, a)):
-            if self._is(one, casadi.OP_SUB) and self.nodes[one].args[1] == other:
+            if self._has_operation(one, casadi.OP_SUB) and self.nodes[one].args[1] == other:
                 return self.nodes[one].args[0]
         return self.node(casadi.OP_ADD, (a, b))
 
@@ -494,7 +494,7 @@ class Builder:
             return self.node(op, tuple(operands))
         return self.constant(float(result))
 
-    def _is(self, number: int, op: int) -> bool:
+    def _has_operation(self, number: int, op: int) -> bool:
         """Return whether the node `number` has the operation `op`."""
         return self.nodes[number].op == op
 

@@ -299,7 +299,7 @@ def order(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
         lambda number: (room[number], number),
         lambda number: (number,),
     ]
-    trials = [_walk(graph, rank) for rank in ranks]
+    trials = [_depth_first(graph, rank) for rank in ranks]
     return min([*trials, graph], key=waiting)
 
 
@@ -341,7 +341,7 @@ def _depth(graph: Graph) -> list[int]:
     return depth
 
 
-def _walk(graph: Graph, rank: _Rank) -> Graph:
+def _depth_first(graph: Graph, rank: _Rank) -> Graph:
     """Return the graph in depth-first order from the outputs.
 
     `rank` maps a node index to a sort key; commutative operands of lower rank are computed first.
@@ -523,7 +523,7 @@ def _merged_groups(
         signs = (1, -1 if node.op == casadi.OP_SUB else 1)
         for opened in ((0, 1), (0,), (1,), ()):
             parts = [
-                _part(groups, operand, position in opened, uses[operand] == 1, longest)
+                _group_elements(groups, operand, position in opened, uses[operand] == 1, longest)
                 for position, operand in enumerate(node.args)
             ]
             if not set(parts[0]) & set(parts[1]):
@@ -539,7 +539,9 @@ def _merged_groups(
     return {number: group for number, group in groups.items() if number not in part_of_another}
 
 
-def _part(groups: dict[int, Group], number: int, opened: bool, alone: bool, longest: int) -> Group:
+def _group_elements(
+    groups: dict[int, Group], number: int, opened: bool, alone: bool, longest: int
+) -> Group:
     """Return the elements of the operand `number`: its own group if it is merged, else itself.
 
     `opened` is whether it may be merged, `alone` whether it has no other use, and `longest` the
@@ -587,13 +589,13 @@ def _write(graph: Graph, groups: dict[int, Group], builder: Builder, ops: set[in
             total = combine(total, value if sign > 0 else builder.negative(value))
         numbers[name] = total
 
-    for name in _in_order(graph, groups):
+    for name in _operands_first(graph, groups):
         write(name)
     results = [[numbers[n] for n in result] for result in graph.results]
     return graph.with_nodes(builder.nodes, results)
 
 
-def _in_order(graph: Graph, groups: dict[int, Group]) -> Iterator[int]:
+def _operands_first(graph: Graph, groups: dict[int, Group]) -> Iterator[int]:
     """Yield the indices of nodes and groups that the outputs need, operands first."""
     done: set[int] = set()
     stack = [number for result in reversed(graph.results) for number in reversed(result)]

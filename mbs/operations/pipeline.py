@@ -154,24 +154,24 @@ def simplification(
     Raises:
         ModelError: the Function has no scalar operations or no finite values, or a pass is unknown.
     """
-    chosen, names = _choose(passes), tuple(parameters)
+    chosen, names = _select_passes(passes), tuple(parameters)
     graph, steps = graph_of(function), list[PassReport]()
     proof = witness(function)
     simplifying = [p for p in chosen if p.name != "order"]
     idle = 0
     for number in range(_MOST_ROUNDS * len(simplifying)):
-        graph, step = _make(simplifying[number % len(simplifying)], graph, names, proof)
+        graph, step = _try_pass(simplifying[number % len(simplifying)], graph, names, proof)
         steps.append(step)
         idle = 0 if step.kept and step.after.total < step.before.total else idle + 1
         if idle == len(simplifying):
             break
     for last in (p for p in chosen if p.name == "order"):
-        graph, step = _make(last, graph, names, proof)
+        graph, step = _try_pass(last, graph, names, proof)
         steps.append(step)
     return Simplification(_function_like(function, graph), graph, tuple(steps))
 
 
-def _choose(passes: Iterable[str] | None) -> Sequence[Pass]:
+def _select_passes(passes: Iterable[str] | None) -> Sequence[Pass]:
     """Return the passes with the given names, in the order of PASSES; all passes for None.
 
     Raise ModelError if a name is unknown.
@@ -184,7 +184,7 @@ def _choose(passes: Iterable[str] | None) -> Sequence[Pass]:
     return [p for p in PASSES if p.name in chosen]
 
 
-def _make(
+def _try_pass(
     one: Pass, graph: Graph, parameters: tuple[str, ...], proof: Witness
 ) -> tuple[Graph, PassReport]:
     """Apply the pass `one` to a graph; return the graph to continue with, and a report.
@@ -270,7 +270,7 @@ def split(function: Function, parameters: Iterable[str] = ("p",)) -> Split:
         raise ModelError(
             f"{function.name()}: its input c has the name of what is computed once; rename it"
         )
-    kept = _needed_of_parameters(graph, names)
+    kept = _parameter_nodes(graph, names)
     column = Port(_CONSTANTS, Sparsity.dense(len(kept), 1))
     setup = function_of(_setup(graph, names, kept, column))
     like = getattr(function, "like", None)
@@ -281,7 +281,7 @@ def split(function: Function, parameters: Iterable[str] = ("p",)) -> Split:
     )
 
 
-def _needed_of_parameters(graph: Graph, names: set[str]) -> list[int]:
+def _parameter_nodes(graph: Graph, names: set[str]) -> list[int]:
     """Return the parameter-only nodes that outputs or other nodes use, without constants.
 
     `names` are the names of the parameters.
@@ -357,8 +357,8 @@ def names_found(function: Function, named: Function) -> Function:
     points = witness(named).points
     target = np.array([_scalars(named, point, count) for point in points]).T
     computed = _values(graph, points)
-    same = _find(graph, target, computed)
-    others = _find(graph, -target, computed)
+    same = _match_scalars(graph, target, computed)
+    others = _match_scalars(graph, -target, computed)
     known = set(same.values())
     nodes, named_nodes = list(graph.nodes), dict(same)
     for k, number in others.items():
@@ -393,7 +393,7 @@ def _values(graph: Graph, points: Sequence[Sequence[DM]]) -> NDArray[np.float64]
     return np.hstack([np.array(Function.call(every, list(point))[0]) for point in points])
 
 
-def _find(
+def _match_scalars(
     graph: Graph, target: NDArray[np.float64], computed: NDArray[np.float64]
 ) -> dict[int, int]:
     """Return the first node with the same values for each named scalar that is not constant.

@@ -378,7 +378,7 @@ def angles_met(algebra: Algebra, polynomial: Polynomial) -> set[Pair]:
     for monomial in polynomial:
         inner: set[str] = set()
         for factor in monomial:
-            inner |= _within(algebra, factor)
+            inner |= _angles_within(algebra, factor)
         outer = inner if len(monomial) == 1 else angles_in(algebra, monomial)
         inner |= outer
         met |= {(min(a, b), max(a, b)) for a in outer for b in inner}
@@ -483,13 +483,13 @@ def _factor_with(algebra: Algebra, monomial: Monomial, pair: Pair, opens_sums: b
     for factor in monomial:
         inside = algebra.written.get(factor, {})
         if len(inside) == 1 or (inside and opens_sums):
-            within = _within(algebra, factor)
+            within = _angles_within(algebra, factor)
             if within & partners or (len(inside) == 1 and within & set(pair)):
                 return factor
     return None
 
 
-def _within(algebra: Algebra, factor: int, depth: int = _DEEPEST_PRODUCT) -> frozenset[str]:
+def _angles_within(algebra: Algebra, factor: int, depth: int = _DEEPEST_PRODUCT) -> frozenset[str]:
     """Return the angles in the polynomial of a node, products expanded to the nesting `depth`."""
     known = algebra.angles_within.get(factor)
     if known is None:
@@ -498,7 +498,7 @@ def _within(algebra: Algebra, factor: int, depth: int = _DEEPEST_PRODUCT) -> fro
             names |= angles_in(algebra, monomial)
             for inner in monomial if depth else ():
                 if len(algebra.written.get(inner, ())) == 1:
-                    names |= _within(algebra, inner, depth - 1)
+                    names |= _angles_within(algebra, inner, depth - 1)
         known = algebra.angles_within[factor] = frozenset(names)
     return known
 

@@ -88,7 +88,7 @@ class ArticulatedInertia:
         """
         if t.is_zero():
             return self
-        return ArticulatedInertia(self.M, *_slid(self.M, self.H, self.J, t, axis))
+        return ArticulatedInertia(self.M, *_translated(self.M, self.H, self.J, t, axis))
 
     def column(self, direction: int) -> SX:
         """Return the wrench (6, 1), force then moment, of a unit acceleration in one direction.
@@ -105,14 +105,14 @@ class ArticulatedInertia:
 
         The body then resists motion along this direction by the inertia of the drive only.
         """
-        felt = _without(
+        felt = _eliminated(
             self.M, self.H, self.J, pivot.column, pivot.gain, pivot.rest, pivot.direction
         )
         return ArticulatedInertia(*felt)
 
 
 @formula((3, 3), (3, 3), (3, 3), (1, 1))
-def _slid(M: SX, old: SX, tensor: SX, t: SX, axis: int) -> tuple[SX, SX]:
+def _translated(M: SX, old: SX, tensor: SX, t: SX, axis: int) -> tuple[SX, SX]:
     """Return H and J of an articulated body displaced by t [m] along an axis (0, 1 or 2).
 
     `M`, `old` and `tensor` are its present M, H and J.
@@ -131,7 +131,9 @@ def _slid(M: SX, old: SX, tensor: SX, t: SX, axis: int) -> tuple[SX, SX]:
 
 
 @formula((3, 3), (3, 3), (3, 3), (6, 1), (6, 1), (6, 1))
-def _without(M: SX, H: SX, J: SX, column: SX, g: SX, own: SX, direction: int) -> tuple[SX, SX, SX]:
+def _eliminated(
+    M: SX, H: SX, J: SX, column: SX, g: SX, own: SX, direction: int
+) -> tuple[SX, SX, SX]:
     """Return M, H and J of an articulated body after elimination of a joint velocity.
 
     `column`, `g` and `own` are column, gain and rest of its `Pivot`; `direction` is its index (0 to
@@ -381,15 +383,17 @@ def inertia_pivots(tree: Tree, poses: list[LinkPose]) -> tuple[SX, SX]:
         free[link.v] = casadi.vertcat(*(pivot.size for pivot in elimination.pivots))
     for j in reversed(range(len(tree.links))):
         link, body = tree.links[j], rigid[j]
-        whole, drive = ArticulatedInertia.of(body), _drive(tree, poses, j)
-        for number, direction in zip(_numbers(link), _DIRECTIONS[link.motion], strict=True):
+        whole, drive = ArticulatedInertia.of(body), _rotor_drive(tree, poses, j)
+        for number, direction in zip(
+            _velocity_indices(link), _DIRECTIONS[link.motion], strict=True
+        ):
             locked[number] = Pivot.of(whole, direction, drive).size
         if link.antecedent >= 0:
             rigid[link.antecedent] += transform_inertia_along(poses[j].steps, body)
     return free, locked
 
 
-def _numbers(link: Link) -> range:
+def _velocity_indices(link: Link) -> range:
     """Return the indices in v of the velocities of the joint of a link."""
     return range(link.v.start, link.v.stop)
 
@@ -415,7 +419,7 @@ def _eliminations(
         elif j in leaves and link.motion.nv == 1:
             inner, outer = pose.motion, pose.seat
             body = ArticulatedInertia.of(pose.motion[0].body(rigid[j]))
-        drive, pivots = _drive(tree, poses, j), list[Pivot]()
+        drive, pivots = _rotor_drive(tree, poses, j), list[Pivot]()
         if inner:
             drive = replace(drive, momentum=inner[0].rotation.apply(drive.momentum))
         for direction in _DIRECTIONS[link.motion]:
@@ -427,7 +431,7 @@ def _eliminations(
     return result[::-1]
 
 
-def _drive(tree: Tree, poses: list[LinkPose], j: int) -> RotorDrive:
+def _rotor_drive(tree: Tree, poses: list[LinkPose], j: int) -> RotorDrive:
     """Return the inertia of the motor and rotor of joint j, in the frame of link j."""
     link = tree.links[j]
     if link.rotor is None:
@@ -454,14 +458,16 @@ def _solution(
     for j in reversed(range(len(tree.links))):
         link, joint = tree.links[j], joints[j]
         wrench = _moved_wrench(joint.inner, needed[j])
-        for number, pivot in zip(_numbers(link), joint.pivots, strict=True):
+        for number, pivot in zip(_velocity_indices(link), joint.pivots, strict=True):
             wrench, left[number] = pivot.transmit(wrench, joint.sign * efforts[number])
         if link.antecedent >= 0:
             needed[link.antecedent] += _moved_wrench(joint.outer, wrench)
     x, twists = zeros(tree.nv), [zeros(6)] * (len(tree.links) + 1)
     for j, link in enumerate(tree.links):
         twist = _moved_twist(joints[j].outer, twists[link.antecedent])
-        for number, pivot in reversed(list(zip(_numbers(link), joints[j].pivots, strict=True))):
+        for number, pivot in reversed(
+            list(zip(_velocity_indices(link), joints[j].pivots, strict=True))
+        ):
             twist, own = pivot.accelerate(twist, left[number])
             x[number] = joints[j].sign * own
         twists[j] = _moved_twist(joints[j].inner, twist)

@@ -111,7 +111,7 @@ def jacobian(seen: JacobianFrame, reference: int | None = None, matrices: int = 
             the number of operations changes.
     """
     J = zeros(6, seen.tree.nv)
-    for branch, arms in zip(seen.branches, _arms(seen.branches, reference), strict=True):
+    for branch, arms in zip(seen.branches, _reference_arms(seen.branches, reference), strict=True):
         columns = _local_columns(seen.tree, branch, arms)
         for k, V, w in _columns_at_start(branch, columns, matrices):
             J[:, k] = casadi.vertcat(V, w)
@@ -122,7 +122,7 @@ Column = tuple[int, SX, SX]
 """Index in v, and the linear and angular velocity (3, 1) of a unit velocity."""
 
 
-def _arms(branches: Sequence[list[PathStep]], reference: int | None) -> list[list[SX]]:
+def _reference_arms(branches: Sequence[list[PathStep]], reference: int | None) -> list[list[SX]]:
     """Return vectors (3, 1) [m] from the end of each step of each path to the reference point.
 
     They are in the local axes of the step.
@@ -131,18 +131,18 @@ def _arms(branches: Sequence[list[PathStep]], reference: int | None) -> list[lis
         branches: paths to the moving frame and to the base.
         reference: link whose origin is the reference point; None for the moving frame.
     """
-    place = [_place(branch, reference) for branch in branches]
+    place = [_reference_step(branch, reference) for branch in branches]
     here = 0 if reference is None or place[0] is not None else 1
     number = place[here]
     assert number is not None
-    inward, arm = _inward(branches[here][: number + 1])
-    outward = _outward(branches[here][number + 1 :], zeros())
-    other = _outward(branches[1 - here], arm)
+    inward, arm = _vectors_to_end(branches[here][: number + 1])
+    outward = _vectors_to_point(branches[here][number + 1 :], zeros())
+    other = _vectors_to_point(branches[1 - here], arm)
     own = inward + outward
     return [own, other] if here == 0 else [other, own]
 
 
-def _place(branch: list[PathStep], reference: int | None) -> int | None:
+def _reference_step(branch: list[PathStep], reference: int | None) -> int | None:
     """Return the index of the step of a path at the origin of link `reference`.
 
     None if the path does not contain it. Without a reference it is the last step, -1 for an empty
@@ -154,7 +154,7 @@ def _place(branch: list[PathStep], reference: int | None) -> int | None:
     return branch.index(mark) if mark in branch else None
 
 
-def _inward(branch: list[PathStep]) -> tuple[list[SX], SX]:
+def _vectors_to_end(branch: list[PathStep]) -> tuple[list[SX], SX]:
     """Return vectors (3, 1) [m] to the end of a path: after each step, and from its start.
 
     Each is in the axes at its own beginning.
@@ -170,7 +170,7 @@ def _inward(branch: list[PathStep]) -> tuple[list[SX], SX]:
     return arms[::-1], arm
 
 
-def _outward(branch: list[PathStep], arm: SX) -> list[SX]:
+def _vectors_to_point(branch: list[PathStep], arm: SX) -> list[SX]:
     """Return vectors (3, 1) [m] to a point from after each step of a path, in axes of the step.
 
     `arm` is the vector to this point from the start of the path.
@@ -486,7 +486,7 @@ def renaud(
             link.
     """
     found = survey(target)
-    ranked = _rank(found, intermediate, reference)
+    ranked = _ranked_choices(found, intermediate, reference)
     counted = _COUNTED if len(found.frames) <= _MOST_PLACES else 1
     candidates = [
         (i, r, cheapest_jacobian(target.along((i, _HOME)), r)) for i, r in ranked[:counted]
@@ -508,7 +508,7 @@ def arm_from(target: VelocityTarget, reference: int | None) -> SX:
     return express(target.tree, target.q, target.axes, place, [p])[0]
 
 
-def _rank(
+def _ranked_choices(
     found: JacobianSamples, intermediate: int | None, reference: int | None
 ) -> list[tuple[int, int | None]]:
     """Return pairs (axes, reference link) in the order of the expected cost of the Jacobian.

@@ -239,16 +239,16 @@ def joint_axes(
         i = link.antecedent
         before = motions[i] if i >= 0 else base
         if link.motion.nv > 1:
-            axes = _of_several(link, poses[j], before, motions[j], v[link.v])
+            axes = _link_frame_axes(link, poses[j], before, motions[j], v[link.v])
         elif len(poses[j].run) > 1:
-            axes = _continue(poses[j], poses[i].spin, result[i], motions[j])
+            axes = _parallel_axes(poses[j], poses[i].spin, result[i], motions[j])
         else:
-            axes = _of_one(link, poses[j], before, motions[j], v[link.v])
+            axes = _single_axis(link, poses[j], before, motions[j], v[link.v])
         result.append(axes)
     return result
 
 
-def _of_several(
+def _link_frame_axes(
     link: Link, pose: LinkPose, before: Acceleration, own: Acceleration, v: SX
 ) -> JointAxes:
     """Return the joint axes of a joint with several velocities: the axes of the link frame.
@@ -275,7 +275,7 @@ def _of_several(
     return JointAxes(None, path, False, free_lines(link, pose, seen), own.w)
 
 
-def _of_one(
+def _single_axis(
     link: Link, pose: LinkPose, before: Acceleration, own: Acceleration, v: SX
 ) -> JointAxes:
     """Return the axes of a joint with one velocity: its frame on the antecedent, shifted along z.
@@ -308,7 +308,9 @@ def _of_one(
     return JointAxes(pose.spin, path, False, (line,), vector([w[0], w[1], own.w[2]]))
 
 
-def _continue(pose: LinkPose, rotation: Rotation, axes: JointAxes, own: Acceleration) -> JointAxes:
+def _parallel_axes(
+    pose: LinkPose, rotation: Rotation, axes: JointAxes, own: Acceleration
+) -> JointAxes:
     """Return joint axes parallel to those of the antecedent, for a joint with a parallel axis.
 
     Args:

@@ -283,7 +283,7 @@ def lagrange_form(tree: Tree, poses: list[LinkPose], v: SX) -> LagrangeForm:
     bodies = regroup(tree, poses, bodies)
     rest, base = zeros(tree.nv), resting_base(zeros())
     w = [motion.w for motion in link_accelerations(tree, poses, v, rest, base)]
-    places = _places(tree, poses, v, w)
+    places = _column_frames(tree, poses, v, w)
     spins = spin_momenta(tree, 0.5 * v)
     framed = [SubtreeInertia.of(body, spins.get(j, zeros())) for j, body in enumerate(bodies)]
     placed = [SubtreeInertia.nothing()] * len(bodies)
@@ -306,7 +306,7 @@ def lagrange_form(tree: Tree, poses: list[LinkPose], v: SX) -> LagrangeForm:
     return form
 
 
-def _places(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_FormPlace]:
+def _column_frames(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_FormPlace]:
     """Return the column frame of each joint: the frame in which its columns are computed.
 
     `v` (nv, 1) are the joint velocities and `w` the angular velocities (3, 1) of the links. A joint
@@ -319,8 +319,8 @@ def _places(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_Form
         linear, angular = motion_behind(link, pose, v[link.v])
         w_i, g_i = (w[i], gravity[i]) if i >= 0 else (zeros(), tree.gravity)
         gravity.append(pose.apply_inverse(g_i))
-        if link.motion is Motion.REVOLUTE and _follows(tree, poses, j, w):
-            result.append(_parallel(pose, result[i], angular))
+        if link.motion is Motion.REVOLUTE and _shares_direction(tree, poses, j, w):
+            result.append(_parallel_place(pose, result[i], angular))
             continue
         steps = _moving_steps(pose, w_i, linear)
         seat = len(pose.seat)
@@ -335,7 +335,7 @@ def _places(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_Form
     return result
 
 
-def _follows(tree: Tree, poses: list[LinkPose], j: int, w: list[SX]) -> bool:
+def _shares_direction(tree: Tree, poses: list[LinkPose], j: int, w: list[SX]) -> bool:
     """Return whether joint j is parallel to the previous joint and their direction varies.
 
     `w` are the angular velocities of the links. If the direction is constant, the links move in a
@@ -349,7 +349,7 @@ def _follows(tree: Tree, poses: list[LinkPose], j: int, w: list[SX]) -> bool:
     return not (turning[0].is_zero() and turning[1].is_zero())
 
 
-def _parallel(pose: LinkPose, before: _FormPlace, angular: SX) -> _FormPlace:
+def _parallel_place(pose: LinkPose, before: _FormPlace, angular: SX) -> _FormPlace:
     """Return the column frame of a joint with pose `pose`, parallel to that of the previous joint.
 
     `before` is that of the previous joint, and `angular` (3, 1) the angular velocity of the joint.
@@ -393,7 +393,7 @@ def _fill_columns(work: _FormWork, j: int, body: SubtreeInertia) -> None:
     `body` are the moments of link j and its descendants, in the column frame of the joint.
     """
     form, link, place = work.form, work.tree.links[j], work.places[j]
-    spin = _at(place.inner, rotor_column(link, j, work.w[j]))
+    spin = _transformed(place.inner, rotor_column(link, j, work.w[j]))
     for number, (linear, angular) in enumerate(unit_motions_at_joint(link)):
         k = link.v.start + number
         column = body.column(place.w, linear, angular)
@@ -430,21 +430,21 @@ def _fill_ancestors(work: _FormWork, j: int, k: int, column: VelocityField) -> N
     driven = tree.links[j]
     while (i := tree.links[j].antecedent) >= 0:
         link, at_place = tree.links[i], places[j].parallel
-        column = _at(places[j].outer, column)
+        column = _transformed(places[j].outer, column)
         if tree.links[j] is driven:
             carried = rotor_column(driven, i, w[i])
-            column = column + (_at(places[i].inner, carried) if at_place else carried)
+            column = column + (_transformed(places[i].inner, carried) if at_place else carried)
         if link.backward:
-            column, at_place = _at(places[i].inner, column), True
+            column, at_place = _transformed(places[i].inner, column), True
         entries = effort_at_joint(link, column.f, column.m)
         form.A[link.v, k], form.A[k, link.v] = entries, entries.T
         form.B[link.v, k] = effort_at_joint(link, column.f_rate, column.m_rate)
         form.B[k, link.v] = column.row(link, places[i].w if at_place else w[i]).T
-        column = column if at_place else _at(places[i].inner, column)
+        column = column if at_place else _transformed(places[i].inner, column)
         j = i
 
 
-def _at(steps: list[Step], column: VelocityField) -> VelocityField:
+def _transformed(steps: list[Step], column: VelocityField) -> VelocityField:
     """Transform the integrals `column` to the frame before successive displacements."""
     for step, velocity in reversed(steps):
         column = column.through(step, velocity)

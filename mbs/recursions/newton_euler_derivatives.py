@@ -348,7 +348,7 @@ def links_by_base(tree: Tree, axes: list[JointAxes]) -> set[int]:
     for j, link in enumerate(tree.links):
         path = tree.path(j)
         pairs = sum(tree.links[i].motion.nv for i in path[:-1])
-        walk = sum(_cost(step) for i in path[1:] for step in axes[i].path)
+        walk = sum(_step_cost(step) for i in path[1:] for step in axes[i].path)
         turns = sum(
             axes[i].rotation is not None and not axes[k].parallel for i, k in pairwise(path)
         )
@@ -358,7 +358,7 @@ def links_by_base(tree: Tree, axes: list[JointAxes]) -> set[int]:
     return set(saved) if sum(saved.values()) > _BASE_LINE * tree.nv else set()
 
 
-def _cost(step: AxesStep) -> int:
+def _step_cost(step: AxesStep) -> int:
     """Return the number of operations that transform a derivative column along a step."""
     match step:
         case MovingFrame():
@@ -407,14 +407,14 @@ def base_axes(tree: Tree, axes: list[JointAxes]) -> list[BaseAxes]:
             if turn is not None and not own.parallel:
                 R = _rotate(R, turn)
         for step in reversed(own.path):
-            R, p, twice = _after(step, R, p, twice)
+            R, p, twice = _axes_after(step, R, p, twice)
         place = FreeDisplacement(MatrixRotation(R), p)
         lines = (line.displaced(R, p).drifting(twice) for line in own.lines)
         result.append(BaseAxes(place, twice, tuple(lines)))
     return result
 
 
-def _after(step: AxesStep, R: SX, p: SX, twice: SX) -> tuple[SX, SX, SX]:
+def _axes_after(step: AxesStep, R: SX, p: SX, twice: SX) -> tuple[SX, SX, SX]:
     """Return orientation, origin and doubled velocity, in the base, of the axes after a step.
 
     `R` (3, 3), `p` (3, 1) and `twice` (3, 1) are those of the axes before the step.

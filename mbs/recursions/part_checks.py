@@ -156,7 +156,7 @@ class _Check:
 
     # Checks of the returned values.
 
-    def _returned(self, method: str, at: At | None = None) -> Any:
+    def _result_of(self, method: str, at: At | None = None) -> Any:
         """Return the result of a method of the component, called with the symbolic motion `at`.
 
         An exception of the method becomes an AssemblyError that names it.
@@ -182,10 +182,10 @@ class _Check:
 
         Raise AssemblyError if it is no dict.
         """
-        found = self._returned(method, at)
+        found = self._result_of(method, at)
         if not isinstance(found, Mapping):
             raise AssemblyError(
-                f"{self._title}: {method} returns {_kind(found)}; return a dict by name"
+                f"{self._title}: {method} returns {_value_text(found)}; return a dict by name"
             )
         return found
 
@@ -217,7 +217,7 @@ class _Check:
         """Raise AssemblyError unless the load of a frame port is a force and a moment (3, 1)."""
         if not isinstance(load, FrameLoad):
             raise AssemblyError(
-                f"{self._title}: loads gives {_kind(load)} at the frame {port}; give"
+                f"{self._title}: loads gives {_value_text(load)} at the frame {port}; give"
                 " custom.force(...), custom.torque(...) or what custom.pull(...) returns"
             )
         for what, value in (("force", load.force), ("moment", load.moment)):
@@ -321,14 +321,14 @@ class _Check:
         for label, event in (self._mapping("events") if self.element.has("events") else {}).items():
             if not isinstance(event, Event):
                 raise AssemblyError(
-                    f"{self._title}: events gives {_kind(event)} for {label!r}; give"
+                    f"{self._title}: events gives {_value_text(event)} for {label!r}; give"
                     " custom.Event(when, {state: value})"
                 )
             self._value(f"when of the event {label!r}", event.when)
             if not isinstance(event.then, Mapping):
                 raise AssemblyError(
-                    f"{self._title}: the event {label!r} sets {_kind(event.then)}; give a dict of"
-                    " states and modes, which may be empty"
+                    f"{self._title}: the event {label!r} sets {_value_text(event.then)}; give a"
+                    " dict of states and modes, which may be empty"
                 )
             for name, value in event.then.items():
                 if name not in self.part.states:
@@ -359,7 +359,8 @@ class _Check:
                     )
                 if not isinstance(law, kinds):
                     raise AssemblyError(
-                        f"{self._title}: {method} gives {_kind(law)} for {label!r}; give {give}"
+                        f"{self._title}: {method} gives {_value_text(law)} for {label!r};"
+                        f" give {give}"
                     )
                 if label in labels:
                     raise AssemblyError(
@@ -380,8 +381,8 @@ class _Check:
                 )
             if not isinstance(pair, (tuple, list)) or len(pair) != 2:
                 raise AssemblyError(
-                    f"{self._title}: limits gives {_kind(pair)} for {port}; give (lower, upper),"
-                    " None for no limit"
+                    f"{self._title}: limits gives {_value_text(pair)} for {port}; give (lower,"
+                    " upper), None for no limit"
                 )
             every = casadi.vertcat(self.q, self.v, self.system.z, *self.inputs.values())
             for given in pair:
@@ -403,21 +404,21 @@ class _Check:
                 )
         if law.unit not in (None, "N", "N.m"):
             raise AssemblyError(
-                f"{self._title}: the effort{_of(label)} has the unit {quoted(law.unit)}; use 'N'"
-                " or 'N.m'"
+                f"{self._title}: the effort{_of_label(label)} has the unit {quoted(law.unit)}; use"
+                " 'N' or 'N.m'"
             )
         if isinstance(law, Friction):
             self._contact_velocity("slip", label, law.slip)
-            limit = self._value(f"limit{_of(label)}", law.limit)
+            limit = self._value(f"limit{_of_label(label)}", law.limit)
             sticking = limit
             if law.sticking is not None:
-                sticking = self._value(f"sticking{_of(label)}", law.sticking)
-            told = "friction is a finite effort, never below zero; write casadi.fmax"
-            self._require_range(f"the limit{_of(label)}", limit, 0.0, np.inf, told)
-            told = "at rest friction holds at least its limit, so make it larger"
+                sticking = self._value(f"sticking{_of_label(label)}", law.sticking)
+            remedy = "friction is a finite effort, never below zero; write casadi.fmax"
+            self._require_range(f"the limit{_of_label(label)}", limit, 0.0, np.inf, remedy)
+            remedy = "at rest friction holds at least its limit, so make it larger"
             at_rest = self._without_slip(law.slip, limit)
             sticking = self._without_slip(law.slip, sticking)
-            self._require_range(f"sticking{_of(label)}", sticking, at_rest, np.inf, told)
+            self._require_range(f"sticking{_of_label(label)}", sticking, at_rest, np.inf, remedy)
         elif isinstance(law, OneWay):
             self._contact_velocity("velocity", label, law.velocity)
         else:
@@ -428,7 +429,7 @@ class _Check:
 
         Its constant term may depend on parameters only. `what` and `label` name it in the message.
         """
-        name = f"the {what}{_of(label)}"
+        name = f"the {what}{_of_label(label)}"
         value = self._value(name, given)
         signals = casadi.vertcat(self.system.z, self.system.u, *self.inputs.values())
         self._require_free_of(value, name, signals, "states or inputs")
@@ -457,7 +458,7 @@ class _Check:
 
         Its limits may depend on parameters only. `label` names the stop in the message.
         """
-        name = f"the gap{_of(label)}"
+        name = f"the gap{_of_label(label)}"
         gap = self._value(name, law.gap)
         signals = casadi.vertcat(self.system.z, self.system.u, *self.inputs.values())
         self._require_free_of(gap, name, signals, "states or inputs")
@@ -473,22 +474,26 @@ class _Check:
         for field in ("lower", "upper", "restitution", "rest_speed"):
             given = getattr(law, field)
             if given is not None:
-                values[field] = self._value(f"{field}{_of(label)}", given)
-                self._require_free_of(values[field], f"{field}{_of(label)}", every, "the motion")
-        told = "give a number between 0 and 1"
-        self._require_range(f"restitution{_of(label)}", values["restitution"], 0.0, 1.0, told)
-        told, slowest = "give more than zero", values["rest_speed"]
-        self._require_range(f"rest_speed{_of(label)}", slowest, NONZERO, np.inf, told)
+                values[field] = self._value(f"{field}{_of_label(label)}", given)
+                self._require_free_of(
+                    values[field], f"{field}{_of_label(label)}", every, "the motion"
+                )
+        remedy = "give a number between 0 and 1"
+        self._require_range(
+            f"restitution{_of_label(label)}", values["restitution"], 0.0, 1.0, remedy
+        )
+        remedy, slowest = "give more than zero", values["rest_speed"]
+        self._require_range(f"rest_speed{_of_label(label)}", slowest, NONZERO, np.inf, remedy)
         if "lower" in values and "upper" in values:
-            told, high = "give more than lower", values["upper"]
-            self._require_range(f"upper{_of(label)}", high, values["lower"], np.inf, told)
+            remedy, high = "give more than lower", values["upper"]
+            self._require_range(f"upper{_of_label(label)}", high, values["lower"], np.inf, remedy)
 
     def _require_range(
-        self, what: str, value: SX, least: SX | float, greatest: SX | float, told: str
+        self, what: str, value: SX, least: SX | float, greatest: SX | float, remedy: str
     ) -> None:
         """Raise AssemblyError if a value is not between `least` and `greatest` at a random state.
 
-        It must also be finite. `what` is its name and `told` the remedy in the message.
+        It must also be finite. `what` is its name and `remedy` the remedy in the message.
         """
         symbols = casadi.vertcat(self.system.z, *self.inputs.values())
         given = [self.q, self.v, symbols, self.system.p]
@@ -496,7 +501,7 @@ class _Check:
         for point in self._probes():
             x, low, high = (float(one) for one in found(*point))
             if not np.isfinite(x) or not low <= x <= high:
-                raise AssemblyError(f"{self._title}: {what} is {x:.6g} at a random state; {told}")
+                raise AssemblyError(f"{self._title}: {what} is {x:.6g} at a random state; {remedy}")
 
     def _crossings(self) -> None:
         """Raise AssemblyError if an event indicator has unknown symbols or depends on inputs."""
@@ -513,7 +518,7 @@ class _Check:
         """Return the scalar expression of a method; None if the component has no such method."""
         if not self.element.has(method):
             return None
-        return self._value(method, self._returned(method))
+        return self._value(method, self._result_of(method))
 
     def _value(self, what: str, value: Any) -> SX:
         """Return a value as an expression (1, 1) of known symbols.
@@ -528,7 +533,7 @@ class _Check:
             shape = "" if found.shape == (0, 0) else f" of the shape {found.shape}"
             of_self = isinstance(value, (Expression, Signal))
             raise AssemblyError(
-                f"{self._title}: {what} is {_kind(value)}{shape};"
+                f"{self._title}: {what} is {_value_text(value)}{shape};"
                 f" {_FROM_AT if of_self else 'give one number or expression'}"
             )
         self._require_known(found, what)
@@ -678,12 +683,12 @@ class _Check:
         return f"{self.part.name} ({type(self.element).__name__})"
 
 
-def _of(label: str) -> str:
+def _of_label(label: str) -> str:
     """Return " of 'label'" for error messages; empty if the label is empty."""
     return f" of {label!r}" if label else ""
 
 
-def _kind(value: Any) -> str:
+def _value_text(value: Any) -> str:
     """Return a short description of a value for error messages."""
     if value is None:
         return "nothing"

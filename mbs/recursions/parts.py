@@ -133,7 +133,7 @@ class PartsAt:
             part: component of the system.
         """
         if part.name not in self._found:
-            self._found[part.name] = self._seen(part, self._inputs_of(part))
+            self._found[part.name] = self._values_at(part, self._inputs_of(part))
         return self._found[part.name]
 
     def with_inputs(self, part: ComponentInstance, inputs: Mapping[str, SX]) -> At:
@@ -143,13 +143,15 @@ class PartsAt:
             part: component of the system.
             inputs: value of each input, by name.
         """
-        return self._seen(part, {name: partial(_same, value) for name, value in inputs.items()})
+        return self._values_at(
+            part, {name: partial(_identity, value) for name, value in inputs.items()}
+        )
 
     def _inputs_of(self, part: ComponentInstance) -> Mapping[str, Callable[[], SX]]:
         """Return a function that evaluates the wired signal of each input, by input name."""
         return {name: partial(self._input, part, name) for name in part.inputs}
 
-    def _seen(self, part: ComponentInstance, inputs: Mapping[str, Callable[[], Any]]) -> At:
+    def _values_at(self, part: ComponentInstance, inputs: Mapping[str, Callable[[], Any]]) -> At:
         """Return the argument `at` of the methods of a component.
 
         `inputs` are functions that evaluate its inputs, by name.
@@ -166,10 +168,10 @@ class PartsAt:
         for name in element.names_of("parameter"):
             given = getattr(element, name)
             values[name] = (
-                partial(_same, None) if given is None else partial(to_sx, given, part.symbols)
+                partial(_identity, None) if given is None else partial(to_sx, given, part.symbols)
             )
         for name, symbol in part.states.items():
-            values[name] = partial(_same, symbol)
+            values[name] = partial(_identity, symbol)
         return At(part.name, part.symbols, values)
 
     def _frame(self, port: str, frames: Mapping[str, Frame]) -> FrameAt:
@@ -239,7 +241,7 @@ class PartsAt:
         """
         for attached in self.system.sensors:
             if attached.sensor.name == source.owner:
-                return self._reading(attached, source)
+                return self._sensor_signal(attached, source)
         if source in self._signals:
             found = self._signals[source]
             if found is None:
@@ -282,7 +284,7 @@ class PartsAt:
             self._outputs[part.name] = part.element.outputs(seen), symbols
         return self._outputs[part.name]
 
-    def _reading(self, attached: AttachedSensor, source: WireSource) -> SX:
+    def _sensor_signal(self, attached: AttachedSensor, source: WireSource) -> SX:
         """Return a sensor signal (1, 1); a symbol if it depends on accelerations or forces.
 
         Raise AssemblyError if the sensor measures a joint at which a loop is cut open.
@@ -355,7 +357,7 @@ class PartsAt:
         moved = replace(part, frames=frames)
         nearby = PartsAt(self.system, self.q, shifts=shifts)
         if inputs is None:
-            found = value(nearby._seen(moved, self._inputs_of(part)))
+            found = value(nearby._values_at(moved, self._inputs_of(part)))
         else:
             found = value(nearby.with_inputs(moved, inputs))
         slopes = casadi.gradient(found, every)
@@ -604,7 +606,7 @@ class PartsAt:
         return casadi.vertcat(SX(0, 1), *order)
 
 
-def _same(value: Any) -> Any:
+def _identity(value: Any) -> Any:
     """Return the value unchanged."""
     return value
 

@@ -127,21 +127,23 @@ def link_poses(tree: Tree, q: SX) -> list[LinkPose]:
     angles: list[SX] = []
     for j, link in enumerate(tree.links):
         i, at = link.antecedent, link.placement
-        seat = _moving(*(screw for frame in link.via for screw in frame.fixed), *at.seat)
+        seat = _without_identities(
+            *(screw for frame in link.via for screw in frame.fixed), *at.seat
+        )
         angle = at.theta + q[link.q] if link.motion is Motion.REVOLUTE else at.theta
         run: tuple[int, ...] = (j,)
-        if link.motion is Motion.REVOLUTE and i >= 0 and _continues(tree.links[i], seat):
+        if link.motion is Motion.REVOLUTE and i >= 0 and _is_parallel(tree.links[i], seat):
             run, angle = (*poses[i].run, j), angles[i] + angle
         angles.append(angle)
-        seat, motion = _joint(link, seat, q[link.q])
+        seat, motion = _joint_displacements(link, seat, q[link.q])
         spin = axis_rotation("z", angle) if len(run) > 1 else motion[0].rotation
         poses.append(LinkPose(seat, motion, run, spin))
     return poses
 
 
-def _continues(before: Link, seat: tuple[ScrewDisplacement, ...]) -> bool:
+def _is_parallel(before: Link, seat: tuple[ScrewDisplacement, ...]) -> bool:
     """Return whether joint `before` is revolute and parallel to the axis at the end of `seat`."""
-    return before.motion is Motion.REVOLUTE and not any(_turns(step) for step in seat)
+    return before.motion is Motion.REVOLUTE and not any(_rotates(step) for step in seat)
 
 
 def base_poses(tree: Tree, poses: list[LinkPose]) -> list[Pose]:
@@ -158,7 +160,7 @@ def base_poses(tree: Tree, poses: list[LinkPose]) -> list[Pose]:
     return result
 
 
-def _joint(
+def _joint_displacements(
     link: Link, seat: tuple[ScrewDisplacement, ...], q: SX
 ) -> tuple[tuple[ScrewDisplacement, ...], tuple[Displacement, ...]]:
     """Return the displacements to the joint frame on the antecedent, and from there to the link.
@@ -171,10 +173,12 @@ def _joint(
             return seat, (ScrewDisplacement.about("z", at.theta + q, at.r),)
         case Motion.PRISMATIC:
             return seat, (ScrewDisplacement.about("z", at.theta, at.r + q),)
-    return seat + _moving(ScrewDisplacement.about("z", at.theta, at.r)), (_free(link, q),)
+    return seat + _without_identities(ScrewDisplacement.about("z", at.theta, at.r)), (
+        _free_displacement(link, q),
+    )
 
 
-def _free(link: Link, q: SX) -> FreeDisplacement:
+def _free_displacement(link: Link, q: SX) -> FreeDisplacement:
     """Return the displacement of a spherical or free joint at q.
 
     Its inverse for a backward joint.
@@ -188,11 +192,11 @@ def _free(link: Link, q: SX) -> FreeDisplacement:
     )
 
 
-def _moving(*steps: ScrewDisplacement) -> tuple[ScrewDisplacement, ...]:
+def _without_identities(*steps: ScrewDisplacement) -> tuple[ScrewDisplacement, ...]:
     """Return the steps that are not the constant identity."""
-    return tuple(step for step in steps if _turns(step) or not step.t.is_zero())
+    return tuple(step for step in steps if _rotates(step) or not step.t.is_zero())
 
 
-def _turns(step: ScrewDisplacement) -> bool:
+def _rotates(step: ScrewDisplacement) -> bool:
     """Return whether a step rotates. A tiny angle has a cosine of one and a nonzero sine."""
     return not (step.rotation.s.is_zero() and step.rotation.c.is_one())

@@ -216,7 +216,7 @@ def path_twists(tree: Tree, poses: list[LinkPose]) -> list[list[PathTwist]]:
         tree: links of the tree.
         poses: pose of each link relative to its antecedent.
     """
-    return _carry(tree, poses, _unit_twists(tree, poses))
+    return _path_twists(tree, poses, _unit_twists(tree, poses))
 
 
 def path_twist_rates(
@@ -232,13 +232,13 @@ def path_twist_rates(
         velocities: velocity of each link in its frame.
     """
     own = [
-        [twist.rate(_of_directions(tree, poses[j], velocities, j)) for twist in twists]
+        [twist.rate(_direction_velocity(tree, poses[j], velocities, j)) for twist in twists]
         for j, twists in enumerate(_unit_twists(tree, poses))
     ]
-    return _carry(tree, poses, own)
+    return _path_twists(tree, poses, own)
 
 
-def _of_directions(tree: Tree, pose: LinkPose, velocities: list[Velocity], j: int) -> Velocity:
+def _direction_velocity(tree: Tree, pose: LinkPose, velocities: list[Velocity], j: int) -> Velocity:
     """Return the velocity, in frame j, of the link to which the directions of joint j are fixed.
 
     `pose` is the pose of link j, and `velocities` are those of the links in their frames.
@@ -276,7 +276,9 @@ def _unit_twists(tree: Tree, poses: list[LinkPose]) -> list[list[PathTwist]]:
     ]
 
 
-def _carry(tree: Tree, poses: list[LinkPose], own: list[list[PathTwist]]) -> list[list[PathTwist]]:
+def _path_twists(
+    tree: Tree, poses: list[LinkPose], own: list[list[PathTwist]]
+) -> list[list[PathTwist]]:
     """Return for each link the twists of all joints on its path, in the frame of the link.
 
     `own` are the twists of the joint of each link.

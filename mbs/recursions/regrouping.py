@@ -40,14 +40,14 @@ def regroup(tree: Tree, poses: list[LinkPose], bodies: list[Body]) -> list[Body]
         link = tree.links[j]
         if link.motion is Motion.FREE:
             continue
-        bodies[j], moved = _parts(link.motion, bodies[j])
+        bodies[j], moved = _split_body(link.motion, bodies[j])
         if link.antecedent >= 0:
-            part = _seen_through(moved, link.motion, poses[j])
+            part = _in_antecedent(moved, link.motion, poses[j])
             bodies[link.antecedent] = _join(bodies[link.antecedent], part)
     return bodies
 
 
-def _parts(motion: Motion, body: Body) -> tuple[Body, Body]:
+def _split_body(motion: Motion, body: Body) -> tuple[Body, Body]:
     """Split a body of link j into the part that stays and the part that is moved to its antecedent.
 
     Both are in frame j. `motion` is the type of joint j.
@@ -60,7 +60,7 @@ def _parts(motion: Motion, body: Body) -> tuple[Body, Body]:
     return body.massive()
 
 
-def _seen_through(body: Body, motion: Motion, pose: LinkPose) -> Body:
+def _in_antecedent(body: Body, motion: Motion, pose: LinkPose) -> Body:
     """Transform the moved part of a body from frame j to frame i of its antecedent.
 
     For a prismatic joint the part is a rotational inertia, which only needs a rotation.
@@ -115,14 +115,14 @@ def shift_frames(
         bodies: inertia of each link, about and in its frame.
         base_rests: whether the base does not move.
     """
-    rise = _rises(tree, poses, base_rests)
+    rise = _frame_shifts(tree, poses, base_rests)
     if all(up.is_zero() for up in rise):
         return poses, bodies
-    moved = [_between(tree, poses, rise, j) for j in range(len(poses))]
+    moved = [_shifted_pose(tree, poses, rise, j) for j in range(len(poses))]
     return moved, [body.shift(2, -rise[j]) for j, body in enumerate(bodies)]
 
 
-def _rises(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
+def _frame_shifts(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
     """Return the shift [m] of each link frame along its joint axis that saves operations.
 
     Args:
@@ -130,7 +130,7 @@ def _rises(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
         poses: pose of each link relative to its antecedent.
         base_rests: whether the base does not rotate.
     """
-    resting = _resting(tree, poses) if base_rests else set()
+    resting = _fixed_origins(tree, poses) if base_rests else set()
     rise = [SX(0)] * len(poses)
     for j in reversed(range(len(poses))):
         if tree.links[j].motion is not Motion.REVOLUTE:
@@ -144,7 +144,7 @@ def _rises(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
     return rise
 
 
-def _resting(tree: Tree, poses: list[LinkPose]) -> set[int]:
+def _fixed_origins(tree: Tree, poses: list[LinkPose]) -> set[int]:
     """Return indices of links whose joint axis has a fixed origin in the base."""
     found: set[int] = set()
     for j, link in enumerate(tree.links):
@@ -159,7 +159,7 @@ def _resting(tree: Tree, poses: list[LinkPose]) -> set[int]:
     return found
 
 
-def _between(tree: Tree, poses: list[LinkPose], rise: list[SX], j: int) -> LinkPose:
+def _shifted_pose(tree: Tree, poses: list[LinkPose], rise: list[SX], j: int) -> LinkPose:
     """Return the pose of link j relative to its antecedent after both frames were shifted.
 
     `rise` is the shift of each link frame along its joint axis [m].

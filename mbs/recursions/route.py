@@ -222,7 +222,7 @@ def join_rotations(steps: Sequence[PathStep], tree: Tree) -> list[PathStep]:
             case RotationAboutZ():
                 rotations.append(step)
             case PathTranslation(p=p):
-                result.append(PathTranslation(_total(rotations).apply(p)))
+                result.append(PathTranslation(_product_of_rotations(rotations).apply(p)))
             case JointAt(link=k) if tree.links[k].motion in (Motion.REVOLUTE, Motion.PRISMATIC):
                 result.append(step)
             case OriginOf():
@@ -235,10 +235,10 @@ def join_rotations(steps: Sequence[PathStep], tree: Tree) -> list[PathStep]:
 
 def _one_rotation(rotations: list[RotationAboutZ]) -> list[PathStep]:
     """Return successive rotations about z as a list of one step; empty if there are none."""
-    return [OtherRotation(_total(rotations))] if rotations else []
+    return [OtherRotation(_product_of_rotations(rotations))] if rotations else []
 
 
-def _total(rotations: list[RotationAboutZ]) -> AxisRotation:
+def _product_of_rotations(rotations: list[RotationAboutZ]) -> AxisRotation:
     """Return the product of rotations about parallel z axes, by the sum of their angles.
 
     Angles are added in the order of the tree.

@@ -132,7 +132,7 @@ def square_jacobian(
     tree, q = target.tree, target.q
     found = survey(target)
     if G is None:
-        places = _places(tree, found, columns)
+        places = _frame_indices(tree, found, columns)
     else:
         found = found.combine(_values(target, G))
         places = [*spread(found.on_path), len(found.frames) - 1]
@@ -145,7 +145,7 @@ def square_jacobian(
     w = cheapest_jacobian(target.along(j))[[3 + k for k in view.w_rows], :]
     J = casadi.vertcat(V, w)
     J = J if G is None else casadi.mtimes(J, G)
-    X_inverse = _back(
+    X_inverse = _inverse_map(
         rows,
         relative_pose(tree, q, i, target.axes).R[list(view.V_rows), :],
         relative_pose(tree, q, j, target.axes).R[list(view.w_rows), :],
@@ -164,7 +164,7 @@ def _values(target: VelocityTarget, A: SX) -> Array:
     return np.array([np.array(f(*sample)) for sample in samples])
 
 
-def _places(tree: Tree, found: JacobianSamples, columns: Sequence[int]) -> list[int]:
+def _frame_indices(tree: Tree, found: JacobianSamples, columns: Sequence[int]) -> list[int]:
     """Return the indices in the survey of the base, the links of columns, and the required axes."""
     kept = []
     for place in found.on_path:
@@ -175,7 +175,7 @@ def _places(tree: Tree, found: JacobianSamples, columns: Sequence[int]) -> list[
     return [*kept, len(found.frames) - 1]
 
 
-def _back(rows: Sequence[int], R_V: SX, R_w: SX, arm: SX) -> SX:
+def _inverse_map(rows: Sequence[int], R_V: SX, R_w: SX, arm: SX) -> SX:
     """Return X^-1, which maps the required rows of [V; w] to the rows of a view.
 
     Args:
@@ -231,7 +231,7 @@ def _views(
         if w_kept is None:
             continue
         for r in references:
-            if _leaks(found.arm(r), R, w, V_rows, w_kept):
+            if _mixes_rows(found.arm(r), R, w, V_rows, w_kept):
                 continue
             for i in places:
                 V_kept = _rows_reached(found.orientation(i), V_rows)
@@ -255,7 +255,9 @@ def _rows_reached(R: Array, rows: Sequence[int]) -> tuple[int, ...] | None:
     return tuple(kept.tolist()) if len(kept) == len(rows) else None
 
 
-def _leaks(arm: Array, R: Array, w: Array, V_rows: Sequence[int], w_kept: Sequence[int]) -> bool:
+def _mixes_rows(
+    arm: Array, R: Array, w: Array, V_rows: Sequence[int], w_kept: Sequence[int]
+) -> bool:
     """Return whether a change of reference adds angular velocities outside the selection to V rows.
 
     `arm` (samples, 3) is the vector from the new reference, `R` (samples, 3, 3) the orientation of

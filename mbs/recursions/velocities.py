@@ -89,7 +89,7 @@ def motion_behind(link: Link, pose: LinkPose, v: SX) -> tuple[SX, SX]:
     Returns:
         linear velocity of the origin of frame j, and angular velocity, (3, 1) each.
     """
-    return _behind(link, pose, motion_at_joint(link, v))
+    return _at_link_frame(link, pose, motion_at_joint(link, v))
 
 
 def unit_motions(link: Link, pose: LinkPose) -> list[tuple[SX, SX]]:
@@ -99,10 +99,10 @@ def unit_motions(link: Link, pose: LinkPose) -> list[tuple[SX, SX]]:
         link: link j with its joint.
         pose: pose of the link relative to its antecedent.
     """
-    return [_behind(link, pose, unit) for unit in unit_motions_at_joint(link)]
+    return [_at_link_frame(link, pose, unit) for unit in unit_motions_at_joint(link)]
 
 
-def _behind(link: Link, pose: LinkPose, velocity: tuple[SX, SX]) -> tuple[SX, SX]:
+def _at_link_frame(link: Link, pose: LinkPose, velocity: tuple[SX, SX]) -> tuple[SX, SX]:
     """Transform a velocity of `motion_at_joint` to the origin and axes of frame j.
 
     `velocity` is (linear, angular); `pose` is the pose of `link` relative to its antecedent.
@@ -228,7 +228,7 @@ def moment_of_rotation(S: SX, rate: RotationRate) -> SX:
         rate: rotation rate of the body.
     """
     pairs = [(rate.U[n, m], rate.U[m, n]) for m, n in ((1, 2), (2, 0), (0, 1))]
-    signs = tuple(_relation(a, b) for a, b in pairs)
+    signs = tuple(_sign_relation(a, b) for a, b in pairs)
     return _moment_of_rotation(S, rate.U, *rate.spread, signs)
 
 
@@ -236,8 +236,8 @@ def moment_of_rotation(S: SX, rate: RotationRate) -> SX:
 def _moment_of_rotation(S: SX, U: SX, s_x: SX, s_y: SX, s_z: SX, signs: tuple[int, ...]) -> SX:
     """Return the moment (3, 1) of `moment_of_rotation` from S, U and the spread of U.
 
-    s_x, s_y and s_z are the spread. `signs` has the `_relation` of U[n, m] and U[m, n] for each
-    row.
+    s_x, s_y and s_z are the spread. For each row, `signs` has the `_sign_relation` of U[n, m] and
+    U[m, n].
     """
     rows = []
     for k, spread in enumerate((s_x, s_y, s_z)):
@@ -247,7 +247,7 @@ def _moment_of_rotation(S: SX, U: SX, s_x: SX, s_y: SX, s_z: SX, signs: tuple[in
     return casadi.vertcat(*rows)
 
 
-def _relation(a: SX, b: SX) -> int:
+def _sign_relation(a: SX, b: SX) -> int:
     """Return 1 if a = -b, -1 if a = b, else 0."""
     if SX.binary(casadi.OP_ADD, a, b).is_zero():
         return 1
@@ -345,7 +345,7 @@ def _rotation(
         w = w_i + angular
         wd = pose.apply_inverse(before.wd) + angular_rate + cross(w_i, angular)
         return w, wd, rotation_rate(w, wd)
-    run = _run(tree, poses, j, motions)
+    run = _parallel_run(tree, poses, j, motions)
     first = poses[run[0]]
     root = motions[tree.links[run[0]].antecedent]
     w_seat, wd_seat = first.at_seat(root.w), first.at_seat(root.wd)
@@ -359,7 +359,9 @@ def _rotation(
     return w, wd, rotation_rate(w, wd, _square_across(before, pose))
 
 
-def _run(tree: Tree, poses: list[LinkPose], j: int, motions: list[Acceleration]) -> tuple[int, ...]:
+def _parallel_run(
+    tree: Tree, poses: list[LinkPose], j: int, motions: list[Acceleration]
+) -> tuple[int, ...]:
     """Return the joints whose summed angles rotate the angular velocity of link j.
 
     A run of parallel axes is joined if the angular velocity has a zero x or y component before the

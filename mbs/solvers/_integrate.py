@@ -162,7 +162,7 @@ class IntegrationCode:
             if function is None:
                 return None
             if library is None:
-                return interpreted_evaluation(function, _examine)
+                return interpreted_evaluation(function, _raise_fatal)
             return compiled_evaluation(function, library)
 
         return tuple(map(evaluation, (own.rhs, own.project, own.jacobian, *changes, *last)))
@@ -171,7 +171,7 @@ class IntegrationCode:
 # Evaluations for the run-time library, and the integration.
 
 
-def _examine(error: BaseException) -> None:
+def _raise_fatal(error: BaseException) -> None:
     """Raise the error of an evaluation if it must stop the integration; else return.
 
     A RuntimeError only means that the evaluation has no value there.
@@ -181,7 +181,7 @@ def _examine(error: BaseException) -> None:
     failure_of(error, "rhs")
 
 
-def _passage(through: Passage | None) -> tuple[Any, ...] | None:
+def _passage_data(through: Passage | None) -> tuple[Any, ...] | None:
     """Return (sizes, sparsity patterns, typical regularity) for the run-time library.
 
     None without passage.
@@ -189,11 +189,13 @@ def _passage(through: Passage | None) -> tuple[Any, ...] | None:
     if through is None:
         return None
     matrices = [(through.rows, number) for number in (1, 2, 5)] + [(through.forces, 0)]
-    patterns = tuple(_places(function.sparsity_out(number)) for function, number in matrices)
+    patterns = tuple(
+        _sparsity_arrays(function.sparsity_out(number)) for function, number in matrices
+    )
     return (tuple(through.size), patterns, through.typical)
 
 
-def _places(pattern: casadi.Sparsity) -> npt.NDArray[np.intc] | None:
+def _sparsity_arrays(pattern: casadi.Sparsity) -> npt.NDArray[np.intc] | None:
     """Return column offsets and row indices of a sparse matrix (`passage_patterns`).
 
     None if dense.
@@ -217,7 +219,7 @@ def _integration(given: IntegrationProblem, code: IntegrationCode) -> Any:
         return core_library().integration(
             code.evaluations(),
             (*sizes, 0 if indicators is None else indicators.numel_out(0)),
-            _passage(own.passage),
+            _passage_data(own.passage),
             given.p,
             (given.rtol, given.atol, given.max_step, own.first_step),
             None if given.sizes is None else np.ascontiguousarray(given.sizes),

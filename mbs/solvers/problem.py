@@ -260,12 +260,12 @@ def equations(
         )
     t, x, p = casadi.MX.sym("t"), casadi.MX.sym("x", n), casadi.MX.sym("p", n_p)
     txp = [t, x, p]
-    slope = casadi.vec(_first(rhs, txp[: rhs.n_in()]))
-    f = _dense("mbs_rhs", txp, slope)
+    slope = casadi.vec(_first_output(rhs, txp[: rhs.n_in()]))
+    f = _dense_function("mbs_rhs", txp, slope)
     jacobian = None
     if method == "rodas":
         f_xt = [casadi.jacobian(slope, v) for v in (x, t)]
-        jacobian = _dense("mbs_jacobian", txp, *f_xt)
+        jacobian = _dense_function("mbs_jacobian", txp, *f_xt)
     g = None if project is None else _projection(project, txp)
     through = None if passage is None else _passage(passage, txp)
     if events is None:
@@ -289,16 +289,16 @@ def _passage(given: Passage, txp: list[casadi.MX]) -> Passage:
         given,
         rows=vectors_dense("mbs_rows", given.rows),
         forces=vectors_dense("mbs_forces", given.forces),
-        regularity=_dense("mbs_regularity", txp, *given.regularity.call(txp)),
+        regularity=_dense_function("mbs_regularity", txp, *given.regularity.call(txp)),
     )
 
 
-def _first(function: casadi.Function, inputs: list[casadi.MX]) -> casadi.MX:
+def _first_output(function: casadi.Function, inputs: list[casadi.MX]) -> casadi.MX:
     """Return the first output of a function for the symbolic `inputs`."""
     return function(*inputs) if function.n_out() == 1 else function(*inputs)[0]
 
 
-def _dense(name: str, inputs: list[casadi.MX], *outputs: casadi.MX) -> casadi.Function:
+def _dense_function(name: str, inputs: list[casadi.MX], *outputs: casadi.MX) -> casadi.Function:
     """Return a Function with dense outputs, expanded to scalar operations if possible."""
     return _scalar(casadi.Function(name, inputs, [casadi.densify(value) for value in outputs]))
 
@@ -340,7 +340,7 @@ def _projection(project: casadi.Function, txp: list[casadi.MX]) -> casadi.Functi
             f"{project}: a projection is project(t, x, p) -> (x, residual), x ({sizes[1]},)"
         )
     outputs = project(*txp[: len(given)])
-    return _dense("mbs_project", txp, *map(casadi.vec, outputs))
+    return _dense_function("mbs_project", txp, *map(casadi.vec, outputs))
 
 
 def _event_functions(
@@ -359,7 +359,7 @@ def _event_functions(
             f"{indicators}: indicators of events are indicators(t, x, p) -> g with the inputs of "
             f"the right-hand side, {sizes[1]} states and {sizes[2]} parameters and modes"
         )
-    g = casadi.vec(_first(indicators, txp[: len(given)]))
+    g = casadi.vec(_first_output(indicators, txp[: len(given)]))
     fired = casadi.MX.sym("fired", g.numel())
     taken = [jump.numel_in(k) for k in range(jump.n_in())]
     left = [jump.numel_out(k) for k in range(jump.n_out())]
@@ -379,10 +379,10 @@ def _event_functions(
             f" ({g.numel()}, 3)"
         )
     return (
-        _dense("mbs_indicators", txp, g),
-        _dense("mbs_rates", txp, rate),
-        _dense("mbs_jump", [*txp, fired], casadi.vec(after[0]), modes),
-        None if events.approaches is None else _dense("mbs_approaches", txp, near),
+        _dense_function("mbs_indicators", txp, g),
+        _dense_function("mbs_rates", txp, rate),
+        _dense_function("mbs_jump", [*txp, fired], casadi.vec(after[0]), modes),
+        None if events.approaches is None else _dense_function("mbs_approaches", txp, near),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi
 import numpy as np
@@ -487,6 +487,7 @@ class Dae(DaeEquations):
         x0, z0, u0, p0: consistent start as one-dimensional arrays: `alg` and `invariants` are zero.
     """
 
+    _outputs: ClassVar[tuple[str, ...]] = ("ode", "alg", "invariants", "q", "v")
     form: str
     elements: Mapping[str, Elements]
     x0: Array
@@ -507,9 +508,9 @@ class Dae(DaeEquations):
 
         It accepts numbers, SX or MX.
         """
-        inputs, outputs = ("x", "z", "u", "p"), ("ode", "alg", "invariants", "q", "v")
-        given, results = ([getattr(self, n) for n in names] for names in (inputs, outputs))
-        return Function("dae", given, results, list(inputs), list(outputs), {"cse": True})
+        inputs = ("x", "z", "u", "p")
+        given, results = ([getattr(self, n) for n in names] for names in (inputs, self._outputs))
+        return Function("dae", given, results, list(inputs), list(self._outputs), {"cse": True})
 
 
 def dae(
@@ -569,19 +570,13 @@ def dae(
     require_no_contacts(system, "dae")
     if form not in FORMS:
         raise ModelError(f"{system.name}: form is {quoted(form)}; use one of {', '.join(FORMS)}")
-    p = np.array(system.parameter_values(parameters), dtype=float)
-    q0, own = state_of(q0), device_states_of(states)
-    q, v = start(system, q0, v0, parameters, guess)
-    if isinstance(q0, State) and own is None:
-        own = q0.z
-    tau = start_efforts(system, tau0)
-    z = by_name(system, "states", own, system.states, system.z_start)
-    u = by_name(system, "inputs", inputs, system.inputs, system.u_default)
+    point = start_values(system, q0, v0, tau0, states, inputs, parameters, guess)
+    q, v, tau, z, u, p = point.values()
     kind = _kind_of_form(system, form, q, p)
     equations, elements = _built_equations(system, kind)
     parts = {field.name: getattr(equations, field.name) for field in fields(equations)}
     x0 = np.concatenate([_start_states(system, kind[0], q, v), z])
-    z0 = _start_algebraic(system, (q, v, tau, z, u, p), equations.z.numel())
+    z0 = _start_algebraic(system, tuple(point.values()), equations.z.numel())
     u0 = np.concatenate([tau[motors(system)], u])
     return Dae(**parts, form=form, elements=elements, x0=x0, z0=z0, u0=u0, p0=p)
 
@@ -695,6 +690,47 @@ def start_efforts(system: System, tau0: Values) -> Array:
                 f" that joint actuated=True, or use one of {names or '(none)'}"
             )
     return tau
+
+
+def start_values(
+    system: System,
+    q0: Start,
+    v0: Start,
+    tau0: Values,
+    states: Mapping[str, float] | State | Result | None,
+    inputs: Mapping[str, float] | None,
+    parameters: Mapping[str, float] | None,
+    guess: Guess,
+) -> dict[str, Array]:
+    """Return the start of a mechanism as arrays "q", "v", "tau", "z", "u" and "p", in this order.
+
+    These are positions (nq,), velocities (nv,), joint efforts (nv,), component states, component
+    inputs and parameters.
+
+    Args:
+        system: open or closed mechanism.
+        q0: start positions, as in `dae`; a `State` also supplies component states that are not
+            given.
+        v0: start velocities by name; zero by default.
+        tau0: start efforts of motors by name; zero by default.
+        states: start values of component states by name; by default as described.
+        inputs: start values of component inputs by name; by default as described.
+        parameters: values of symbols; other symbols have their defaults.
+        guess: approximate positions of other joints, which select the assembly branch.
+
+    Raises:
+        ModelError: a name is unknown, a joint of tau0 has no motor, or a symbol has no value.
+        Unclosable: the loops cannot be closed at q0.
+    """
+    p = np.array(system.parameter_values(parameters), dtype=float)
+    q0, own = state_of(q0), device_states_of(states)
+    q, v = start(system, q0, v0, parameters, guess)
+    if isinstance(q0, State) and own is None:
+        own = q0.z
+    tau = start_efforts(system, tau0)
+    z = by_name(system, "states", own, system.states, system.z_start)
+    u = by_name(system, "inputs", inputs, system.inputs, system.u_default)
+    return {"q": q, "v": v, "tau": tau, "z": z, "u": u, "p": p}
 
 
 def _start_states(system: System, form: str, q: Array, v: Array) -> Array:

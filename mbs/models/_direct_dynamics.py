@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import casadi
 import numpy as np
 from casadi import SX, Function
 from numpy.typing import NDArray
@@ -272,12 +271,26 @@ def _without_inertia_in_tree(system: System) -> int | None:
     The joints of descendants are free to move.
     """
     q = SX.sym("q", system.nq)
-    poses = link_poses(system.tree, normalised(system.tree, q))
-    both = casadi.horzcat(*inertia_pivots(system.tree, poses))
-    pivots = Function("pivots", [q, system.p], [both], {"cse": True})
+    pivots = inertia_pivots(system.tree, link_poses(system.tree, normalised(system.tree, q)))
+    return velocity_without_inertia(
+        system, Function("pivots", [q, system.p], list(pivots), {"cse": True})
+    )
+
+
+def velocity_without_inertia(system: System, pivots: Function) -> int | None:
+    """Return the largest index in v of a velocity of the tree that moves no inertia, or None.
+
+    It is tested at a random configuration.
+
+    Args:
+        system: open or closed mechanism.
+        pivots: Function of q, and of p if the system has parameters. It returns, by velocity, the
+            inertia with free joints of descendants, and that with locked ones.
+    """
     rng = np.random.default_rng(_SEED)
-    configuration = np.array(system.configuration) + rng.uniform(-1.0, 1.0, system.nq)
-    free, locked = np.array(pivots(configuration, system.p_default)).T
+    q = np.array(system.configuration) + rng.uniform(-1.0, 1.0, system.nq)
+    given = [q, system.p_default][: pivots.n_in()]
+    free, locked = (np.array(x).ravel() for x in pivots(*given))
     # magnitude: inertia from files may be negative, but must not be zero
     moves = np.abs(free) > _VANISHING * np.maximum(np.abs(locked), _NO_INERTIA)
     return None if moves.all() else int(np.max(np.flatnonzero(~moves)))

@@ -26,9 +26,9 @@ from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.assembly.tree import position_rate
 from mbs.errors import ModelError
 from mbs.loops.closure_equations import closure_rows, independent_closure
-from mbs.loops.configuration import Guess, Start, Values, start
+from mbs.loops.configuration import Guess, Start, Values
 from mbs.loops.velocity import velocity_rows
-from mbs.models._dae import driving, motors, start_efforts
+from mbs.models._dae import driving, motors, start_values
 from mbs.models._direct_dynamics import independent_dynamics
 from mbs.models._joint_wrenches import shown_outputs
 from mbs.models._measurements import readings, with_readings
@@ -40,7 +40,6 @@ from mbs.models.contacts import (
     require_lasting_rows,
     require_no_contacts,
 )
-from mbs.models.state.signals import by_name
 from mbs.models.symbols import (
     ModelSymbols,
     derivatives_check,
@@ -49,7 +48,7 @@ from mbs.models.symbols import (
     surroundings,
     symbols_of,
 )
-from mbs.result import Result, State, device_states_of, state_of
+from mbs.result import Result, State
 from mbs.solvers.linear import solve_square
 from mbs.text import did_you_mean, quoted
 
@@ -137,19 +136,8 @@ class Linearisation:
             Unclosable: the loops cannot be closed at q0.
         """
         system = self.system
-        q0, own = state_of(q0), device_states_of(states)
-        q, v = start(system, q0, v0, parameters, guess)
-        if isinstance(q0, State) and own is None:
-            own = q0.z
-        point = {
-            "q": q,
-            "v": v,
-            "v_a": v[list(system.active)],
-            "tau": start_efforts(system, tau0),
-            "z": by_name(system, "states", own, system.states, system.z_start),
-            "u": by_name(system, "inputs", inputs, system.inputs, system.u_default),
-            "p": system.parameter_values(parameters),
-        }
+        point = start_values(system, q0, v0, tau0, states, inputs, parameters, guess)
+        point["v_a"] = point["v"][list(system.active)]
         if self.holds is not None:
             self._require_mode(*(point[name] for name in self.holds.name_in()))
         found = self.function(*(point[name] for name in self.function.name_in()))

@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import casadi
-import numpy as np
 from casadi import Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction, require_system
 from mbs.assembly.tree import normalised
 from mbs.errors import ModelError
-from mbs.models._direct_dynamics import direct_dynamics
+from mbs.models._direct_dynamics import direct_dynamics, velocity_without_inertia
 from mbs.models._inverse_dynamics import inverse_dynamics
 from mbs.models.tree_table import shapes_of, table_of, unknown_to_core
 from mbs.native import compiled
@@ -199,27 +198,14 @@ def core_function(system: System, name: str) -> Function:
 # Detection of velocities that move no inertia.
 
 
-_SEED = 20260103
-_VANISHING = 1e-12
-"""Ratio of the inertia against a velocity with free descendants to its inertia with locked
-descendants, below which it counts as zero: a sum over all links has a rounding error of 1e-15."""
-_NO_INERTIA = 1e-30
-"""Smallest denominator of this ratio [kg m^2 or kg]; it avoids 0/0, and no body has so little."""
-
-
 def _require_inertia(system: System) -> None:
     """Raise ModelError if a velocity of the tree moves no inertia, as in `direct_dynamics`."""
     if any(p.default is None for p in system.parameters):
         return
     pivots = casadi.external("pivots", str(core_library(system).path))
-    rng = np.random.default_rng(_SEED)
-    q = np.array(system.configuration) + rng.uniform(-1.0, 1.0, system.nq)
-    p = [system.p_default] if system.parameters else []
-    free, locked = (np.array(x).ravel() for x in pivots(q, *p))
-    # magnitude: inertia from files may be negative, but must not be zero
-    moves = np.abs(free) > _VANISHING * np.maximum(np.abs(locked), _NO_INERTIA)
-    if not moves.all():
-        name = system.speeds[int(np.max(np.flatnonzero(~moves)))].name
+    number = velocity_without_inertia(system, pivots)
+    if number is not None:
+        name = system.speeds[number].name
         raise ModelError(
             f"{system.name}: {name} can move without moving any inertia, so its acceleration"
             " is not determined; give mass to what it carries, or a rotor inertia Ia"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from numbers import Real
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi
 import numpy as np
@@ -540,20 +540,11 @@ class PhaseDae(Dae):
 
     Attributes:
         f: (3, n) forces of the planes on the points, in the axes of the planes, as expressions of
-            x, z, u and p; zero for free points.
+            x, z, u and p; zero for free points. It is also the last output of `function`.
     """
 
+    _outputs: ClassVar[tuple[str, ...]] = (*Dae._outputs, "f")
     f: SX
-
-    def function(self) -> Function:
-        """Return the Function ``dae(x, z, u, p) -> ode, alg, invariants, q, v, f``.
-
-        It accepts numbers, SX or MX.
-        """
-        inputs = ("x", "z", "u", "p")
-        outputs = ("ode", "alg", "invariants", "q", "v", "f")
-        given, results = ([getattr(self, n) for n in names] for names in (inputs, outputs))
-        return Function("dae", given, results, list(inputs), list(outputs), {"cse": True})
 
 
 def phase_dae(standing: Standing, explicit: Function, form: str, begin: PhaseStart) -> PhaseDae:

@@ -358,11 +358,11 @@ class ErrorController(SignalBlock):
         return {"u": self._saturate(at)}
 
     def _saturate(self, at: At) -> SX:
-        """Return the output limited to the range from low to high."""
+        """Return the output: the result of `_command`, limited to the range from low to high."""
         return saturate(self._command(at), at.low, at.high, SX(0))
 
     def _command(self, at: At) -> SX:
-        """Return u0, the output before the limits."""
+        """Return the output before the limits; a subclass defines it."""
         raise NotImplementedError
 
 
@@ -384,7 +384,7 @@ class PI(ErrorController):
     x = custom.state()
 
     def _command(self, at: At) -> SX:
-        """Return kp e + x, the output before the limits."""
+        """Return kp e + x, the output before the limits, with e = target - measured."""
         return SX(at.kp * (at.target - at.measured) + at.x)
 
 
@@ -422,7 +422,10 @@ class PID(ErrorController):
         return {**ErrorController.rates(self, at), "f": (error - at.f) / at.filter}
 
     def _command(self, at: At) -> SX:
-        """Return kp e + x + kd (e - f) / filter, the output before the limits."""
+        """Return kp e + x + kd (e - f) / filter, the output before the limits.
+
+        e is target - measured.
+        """
         error = at.target - at.measured
         return SX(at.kp * error + at.x + at.kd * (error - at.f) / at.filter)
 
@@ -452,7 +455,10 @@ class SampledBlock(SignalBlock):
         return {"samples": Event(at.left, {"left": at.period, **self._sample(at)})}
 
     def _sample(self, at: At) -> Mapping[str, SX]:
-        """Return the new value of each mode at a sampling instant, by name."""
+        """Return the new values of modes at a sampling instant, by name.
+
+        A subclass defines them.
+        """
         raise NotImplementedError
 
 
@@ -469,7 +475,7 @@ class SampleHold(SampledBlock):
     sample = custom.mode()
 
     def _sample(self, at: At) -> Mapping[str, SX]:
-        """Return {"sample": u}."""
+        """Return {"sample": u}: the mode gets the present input."""
         return {"sample": at.u}
 
     def outputs(self, at: At) -> Mapping[str, SX]:

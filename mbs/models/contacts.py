@@ -267,7 +267,10 @@ class Contacts:
         return modes.stuck * (y - taken), friction
 
     def indicators(self, state: ContactState, modes: Modes, y: SX, inertia: SX) -> SX:
-        """Return the event indicators (5 k, 1) in the order of KINDS, positive between events.
+        """Return the event indicators (5 k, 1) of k contact rows, positive between events.
+
+        They are k indicators each of: lower limit, upper limit, holding effort too negative, too
+        positive, end of sliding (`KINDS`).
 
         Args:
             state: current contact state.

@@ -273,7 +273,11 @@ def _built(system: System) -> Skeleton:
 
 
 def _joint(marks: _Marks, row: JointRow) -> SkeletonJoint:
-    """Return name, end points and axes of a joint for drawing; its points are added to `marks`."""
+    """Return name, end points and axes of a joint for drawing.
+
+    `row` is the row of the joint in `system.joints`. Its points and directions are added to
+    `marks`.
+    """
     (a, pose_a), (b, pose_b) = row.frame_a, row.frame_b
     return SkeletonJoint(
         name=row.name,
@@ -286,7 +290,10 @@ def _joint(marks: _Marks, row: JointRow) -> SkeletonJoint:
 
 
 def _tree_axes(marks: _Marks, name: str) -> tuple[SkeletonAxis, ...]:
-    """Return the axes of a tree joint: z axes of links with revolute or prismatic motion."""
+    """Return the axes of the tree joint `name`: z axes of links with revolute or prismatic motion.
+
+    The directions are added to `marks`.
+    """
     system = marks.system
     moved = (
         (j, link.motion)
@@ -297,7 +304,10 @@ def _tree_axes(marks: _Marks, name: str) -> tuple[SkeletonAxis, ...]:
 
 
 def _cut_axes(marks: _Marks, row: JointRow) -> tuple[SkeletonAxis, ...]:
-    """Return the axes of a cut joint: the first is fixed in frame_a, further ones in frame_b."""
+    """Return the axes of a cut joint: the first is fixed in frame_a, further ones in frame_b.
+
+    `row` is the row of the joint in `system.joints`. The directions are added to `marks`.
+    """
     cut = next(cut for cut in marks.system.cuts if cut.edge.joint.name == row.name)
     frames = (row.frame_a, row.frame_b)
     found = []
@@ -310,7 +320,11 @@ def _cut_axes(marks: _Marks, row: JointRow) -> tuple[SkeletonAxis, ...]:
 
 
 def _axis(marks: _Marks, link: int, motion: Motion, axis: SX) -> SkeletonAxis:
-    """Return the drawn axis of a freedom; `axis` (3, 1) is its direction in the link frame."""
+    """Return the drawn axis of a freedom with the type `motion`, revolute or prismatic.
+
+    `axis` (3, 1) is its direction in the frame of the link with index `link`; it is added to
+    `marks`.
+    """
     kind: Literal["revolute", "prismatic"]
     kind = "revolute" if motion is Motion.REVOLUTE else "prismatic"
     return SkeletonAxis(kind, marks.direction(link, axis))
@@ -323,7 +337,7 @@ def _shown_frames(system: System) -> list[str | int]:
 
 
 def _frame(marks: _Marks, name: str | int) -> SkeletonFrame:
-    """Return origin and axes of a named frame for drawing."""
+    """Return origin and axes of the frame `name` for drawing; they are added to `marks`."""
     link, pose = marks.system.frame(name)
     x, y, z = (marks.direction(link, pose.R[:, k]) for k in range(3))
     label = f"link {name}" if isinstance(name, int) else name
@@ -331,7 +345,10 @@ def _frame(marks: _Marks, name: str | int) -> SkeletonFrame:
 
 
 def _link(marks: _Marks, number: int, joints: Sequence[SkeletonJoint]) -> SkeletonLink:
-    """Return bodies and line segments of the link with index `number` (0: base) for drawing."""
+    """Return bodies and line segments of the link with index `number` (0: base) for drawing.
+
+    `joints` are all joints of the skeleton. Further points of the link are added to `marks`.
+    """
     bodies = tuple(row.name for row in marks.system.bodies if row.link == number)
     if number == 0:
         return SkeletonLink(0, bodies, (), None)
@@ -359,9 +376,10 @@ def _link(marks: _Marks, number: int, joints: Sequence[SkeletonJoint]) -> Skelet
 def _segments(
     marks: _Marks, joined: Sequence[int], shown: Sequence[int]
 ) -> tuple[tuple[int, int], ...]:
-    """Return line segments (pairs of columns) between joints and other points of a link.
+    """Return line segments between joints and other points of a link, as pairs of columns.
 
-    `joined` and `shown` are columns of the joints and of the other points.
+    `joined` and `shown` are the columns of the joints and of the other points in the points of
+    `marks`.
     """
     columns = [*joined, *shown]
     if not columns:
@@ -396,7 +414,10 @@ def _farthest_frame(marks: _Marks, number: int, joint: int, centre: int | None) 
 
 
 def _mass_centre(marks: _Marks, number: int) -> int | None:
-    """Return the column of the centre of mass of a link; None for zero or unknown mass."""
+    """Return the column of the centre of mass of link `number`, added to the points of `marks`.
+
+    None for a link of zero or unknown mass.
+    """
     inertia, system = marks.system.tree.links[number - 1].inertia, marks.system
     known = casadi.vertcat(inertia.m, inertia.ms)
     at = Function("centre", [system.p], [known])(system.parameter_values(needed=()))
@@ -406,7 +427,7 @@ def _mass_centre(marks: _Marks, number: int) -> int | None:
 
 
 def _function(system: System, marks: _Marks) -> Function:
-    """Return the function of q that computes all points and directions of the skeleton."""
+    """Return the function of q that computes all points and directions collected in `marks`."""
 
     def build() -> tuple[Named, Named]:
         q = SX.sym("q", system.nq)

@@ -113,9 +113,10 @@ class ArticulatedInertia:
 
 @formula((3, 3), (3, 3), (3, 3), (1, 1))
 def _translated(M: SX, old: SX, tensor: SX, t: SX, axis: int) -> tuple[SX, SX]:
-    """Return H and J of an articulated body displaced by t [m] along an axis (0, 1 or 2).
+    """Return the blocks H and J of an articulated inertia whose body is displaced along an axis.
 
-    `M`, `old` and `tensor` are its present M, H and J.
+    `M`, `old` and `tensor` (3, 3) are the present blocks M, H and J of `ArticulatedInertia`. The
+    displacement is t [m] along the axis 0, 1 or 2.
     """
     k, h = (axis + 1) % 3, (axis + 2) % 3
     H, J = SX(old), SX(tensor)
@@ -134,10 +135,10 @@ def _translated(M: SX, old: SX, tensor: SX, t: SX, axis: int) -> tuple[SX, SX]:
 def _eliminated(
     M: SX, H: SX, J: SX, column: SX, g: SX, own: SX, direction: int
 ) -> tuple[SX, SX, SX]:
-    """Return M, H and J of an articulated body after elimination of a joint velocity.
+    """Return the blocks M, H and J (3, 3) of an articulated inertia without one joint velocity.
 
-    `column`, `g` and `own` are column, gain and rest of its `Pivot`; `direction` is its index (0 to
-    5).
+    The velocity has the index `direction` (0 to 5) in a twist. `column`, `g` and `own` (6, 1) are
+    `column`, `gain` and `rest` of the `Pivot` that eliminates it.
     """
     k, u = direction % 3, SX(column)
     u[direction] = 0
@@ -226,9 +227,10 @@ class Pivot:
 
 @formula((6, 1), (1, 1), (3, 1))
 def _pivot(column: SX, inertia: SX, momentum: SX, direction: int) -> tuple[SX, SX, SX, SX, SX, SX]:
-    """Return column, rest, size, inverse, gain and ratio of a `Pivot`.
+    """Return column, rest, size, inverse, gain and ratio, the fields of `Pivot`.
 
-    `column` (6, 1) is that of the body; `inertia` and `momentum` are those of the `RotorDrive`.
+    `column` (6, 1) is the wrench of the body for a unit acceleration in the joint direction of
+    index `direction`; `inertia` and `momentum` are those of the `RotorDrive` of the joint.
     """
     column = SX(column)
     column[3:] += momentum
@@ -243,9 +245,10 @@ def _pivot(column: SX, inertia: SX, momentum: SX, direction: int) -> tuple[SX, S
 
 @formula((6, 1), (1, 1), (6, 1), (1, 1))
 def _transmitted(wrench: SX, effort: SX, gain: SX, ratio: SX, direction: int) -> tuple[SX, SX]:
-    """Return the wrench (6, 1) and the remaining effort of `Pivot.transmit`.
+    """Return the wrench (6, 1) on the antecedent, and the effort left to accelerate the joint.
 
-    Arguments as in `Pivot`.
+    `wrench` (6, 1) is what the body needs at zero joint acceleration, and `effort` is the joint
+    effort. `gain`, `ratio` and `direction` are those of the `Pivot` of the joint.
     """
     left = effort - wrench[direction]
     wrench = wrench - gain * left
@@ -257,9 +260,11 @@ def _transmitted(wrench: SX, effort: SX, gain: SX, ratio: SX, direction: int) ->
 def _accelerated(
     twist: SX, left: SX, gain: SX, inverse: SX, ratio: SX, direction: int
 ) -> tuple[SX, SX]:
-    """Return the acceleration (6, 1) after a joint and the joint acceleration.
+    """Return the acceleration (6, 1) of the link after a joint, and the joint acceleration.
 
-    See `Pivot.accelerate`.
+    `twist` (6, 1) is the acceleration before the joint and `left` the second result of
+    `_transmitted`. `gain`, `inverse`, `ratio` and `direction` are those of the `Pivot` of the
+    joint.
     """
     before = twist[direction]
     own = casadi.dot(gain, twist) - inverse * left + ratio * before

@@ -158,14 +158,21 @@ def square_jacobian(
 
 
 def _values(target: VelocityTarget, A: SX) -> Array:
-    """Return the values (samples, ...) of the matrix A at the random configurations of a survey."""
+    """Return the values (samples, ...) of the matrix A at random configurations.
+
+    `target` has the symbols of A. The configurations are those of `random_samples`.
+    """
     f = Function("f", [target.q, target.p], [casadi.densify(A)])
     samples = random_samples(target.tree, target.p.numel())
     return np.array([np.array(f(*sample)) for sample in samples])
 
 
 def _frame_indices(tree: Tree, found: JacobianSamples, columns: Sequence[int]) -> list[int]:
-    """Return the indices in the survey of the base, the links of columns, and the required axes."""
+    """Return the indices in `found.frames` of the frames whose axes and origins are tried.
+
+    These are the base, the links on the path that the velocities `columns` move, and the required
+    axes.
+    """
     kept = []
     for place in found.on_path:
         link, _ = found.frames[place]
@@ -176,7 +183,9 @@ def _frame_indices(tree: Tree, found: JacobianSamples, columns: Sequence[int]) -
 
 
 def _inverse_map(rows: Sequence[int], R_V: SX, R_w: SX, arm: SX) -> SX:
-    """Return X^-1, which maps the required rows of [V; w] to the rows of a view.
+    """Return X^-1, which maps the required rows of [V; w] to rows in other axes.
+
+    The other axes and their reference point are those of a `_View`.
 
     Args:
         rows: required rows.
@@ -197,10 +206,11 @@ def _inverse_map(rows: Sequence[int], R_V: SX, R_w: SX, arm: SX) -> SX:
 def _sign(
     B: SX, values: Array, blocks: tuple[Block, ...] | None, X_inverse: SX, whole: Array
 ) -> SquareJacobian:
-    """Return the square Jacobian with the sign that relates its determinant to those of its blocks.
+    """Return the square Jacobian, with the sign of its determinant relative to that of its blocks.
 
-    `X_inverse` is stored in it. `values` (samples, m, m) are those of B, and `whole` (samples, m,
-    m) those of the whole matrix.
+    It is the sign of the determinant of the whole matrix, divided by the product of those of the
+    `blocks` of `B`. `values` and `whole` (samples, m, m) are numeric values of `B` and of the whole
+    matrix. `X_inverse` is stored in the result.
     """
     if blocks is None or _always_singular(values):
         return SquareJacobian(B, None, X_inverse, 1)
@@ -218,9 +228,10 @@ def _always_singular(values: Array) -> bool:
 def _views(
     found: JacobianSamples, places: Sequence[int], rows: Sequence[int], columns: Sequence[int]
 ) -> Iterator[_View]:
-    """Yield the candidates in which the selected rows do not mix with other rows of [V; w].
+    """Yield candidates of axes and reference point for selected rows and columns of the Jacobian.
 
-    `places` are the frames to try, as indices in the survey.
+    In these axes the selected `rows` do not mix with other rows of [V; w]. `places` are the frames
+    to try, as indices in `found.frames`.
     """
     V_rows, w_rows = [k for k in rows if k < 3], [k - 3 for k in rows if k >= 3]
     memo: dict[bytes, tuple[Block, ...] | None] = {}

@@ -200,9 +200,10 @@ def rotation_rate(w: SX, wd: SX, across: SX | None = None) -> RotationRate:
 
 @formula((3, 1), (3, 1), (1, 1))
 def _rotation_rate(w: SX, wd: SX, across: SX, known: bool) -> tuple[SX, SX, SX, SX]:
-    """Return U = skew(wd) + skew(w) skew(w), and the three differences `RotationRate.spread`.
+    """Return U = skew(wd) + skew(w) skew(w) (3, 3), and U33 - U22, U11 - U33 and U22 - U11.
 
-    `across` is w[0]^2 + w[1]^2 if `known`.
+    `w` and `wd` (3, 1) are angular velocity and acceleration. `across` is w[0]^2 + w[1]^2 if
+    `known`, else it is computed.
     """
     x, y, z = w[0], w[1], w[2]
     xx, zz, xy, xz, yz = x * x, z * z, x * y, x * z, y * z
@@ -234,10 +235,11 @@ def moment_of_rotation(S: SX, rate: RotationRate) -> SX:
 
 @formula((3, 3), (3, 3), (1, 1), (1, 1), (1, 1))
 def _moment_of_rotation(S: SX, U: SX, s_x: SX, s_y: SX, s_z: SX, signs: tuple[int, ...]) -> SX:
-    """Return the moment (3, 1) of `moment_of_rotation` from S, U and the spread of U.
+    """Return the moment (3, 1) J wd + w x (J w) of a body, see `moment_of_rotation`.
 
-    s_x, s_y and s_z are the spread. For each row, `signs` has the `_sign_relation` of U[n, m] and
-    U[m, n].
+    `S` (3, 3) are its second moments of mass, `U` (3, 3) and s_x, s_y, s_z are `U` and `spread` of
+    its `RotationRate`. For each row k with the next indices m, n, `signs` has the `_sign_relation`
+    of U[n, m] and U[m, n].
     """
     rows = []
     for k, spread in enumerate((s_x, s_y, s_z)):

@@ -182,9 +182,9 @@ def _raise_fatal(error: BaseException) -> None:
 
 
 def _passage_data(through: Passage | None) -> tuple[Any, ...] | None:
-    """Return (sizes, sparsity patterns, typical regularity) for the run-time library.
+    """Return the data of a `Passage` that the run-time library needs; None without a passage.
 
-    None without passage.
+    They are its sizes, the sparsity patterns of its matrices, and its typical regularity.
     """
     if through is None:
         return None

@@ -275,7 +275,7 @@ def equations(
 
 
 def _passage(given: Passage, txp: list[casadi.MX]) -> Passage:
-    """Return a passage with the function names that the integrator requires and dense vectors.
+    """Return a `Passage` with the function names that the integrator requires and dense vectors.
 
     `txp` are the symbols of t, x and p.
     """

@@ -54,7 +54,7 @@ class Pose:
 
     @staticmethod
     def rotation(R: SX) -> Pose:
-        """Return the pose with zero origin and the orientation R (3, 3), without a chain."""
+        """Return the pose with zero origin and the orientation R (3, 3), with an empty `chain`."""
         return Pose(casadi.densify(R), zeros())
 
     @staticmethod

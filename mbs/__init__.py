@@ -85,6 +85,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    """Return a public class or a submodule, imported at the first access."""
     if name in _NAMES:
         return getattr(importlib.import_module(_NAMES[name]), name)
     if name in _MODULES:
@@ -93,4 +94,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
+    """Return the names of the package, including those that are not imported yet."""
     return sorted([*globals(), *__all__])

@@ -12,7 +12,9 @@ from mbs.text import quoted
 def names_given(
     title: str, value: Any, example: str, error: type[MbsError] = ModelError
 ) -> tuple[str, ...]:
-    """Return the names in an argument; none if it is None.
+    """Return the names in an argument of a user, which must be a list of texts.
+
+    It is empty if the argument is None.
 
     Args:
         title: mechanism and argument, such as "arm: inputs".
@@ -21,7 +23,7 @@ def names_given(
         error: class of the error.
 
     Raises:
-        MbsError: the value is a text or has no elements.
+        MbsError: the value is a text, has no elements, or an element is no text.
     """
     if value is None:
         return ()
@@ -36,7 +38,7 @@ def names_given(
 
 
 def elements_of(value: Any) -> tuple[Any, ...] | None:
-    """Return the elements of a value; None if it has none, as a number or a matrix of CasADi."""
+    """Return the elements of a value as a tuple; None if it has none, such as a number."""
     if not isinstance(value, Iterable):
         return None
     try:
@@ -48,7 +50,7 @@ def elements_of(value: Any) -> tuple[Any, ...] | None:
 def values_given(
     title: str, value: Any, example: str, error: type[MbsError] = ModelError
 ) -> dict[str, Any]:
-    """Return the values by name in an argument; an empty dict if it is left out.
+    """Return the dict of values by name in an argument of a user; empty if it is None.
 
     Args:
         title: mechanism and argument, such as "arm: inputs".

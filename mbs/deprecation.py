@@ -9,7 +9,9 @@ from typing import Any
 
 
 def moved(module: str, names: Mapping[str, str]) -> Callable[[str], Any]:
-    """Return the function `__getattr__` of a module from which names have moved.
+    """Return the function `__getattr__` of a module, which finds names that have moved.
+
+    It warns with a DeprecationWarning, and raises AttributeError for other names.
 
     Args:
         module: name of the module.

@@ -116,6 +116,7 @@ class Interrupted(KeyboardInterrupt):
 
     @result.setter
     def result(self, value: Any) -> None:
+        """Set the `Result` or `Sweep` to return instead of that of `compute`."""
         self._result = value
 
 

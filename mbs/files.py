@@ -17,7 +17,10 @@ PathLike = str | os.PathLike[str]
 
 
 def path_of(path: object) -> Path:
-    """Return a path argument as a Path.
+    """Return a path argument of a user as a Path.
+
+    Args:
+        path: text or os.PathLike.
 
     Raises:
         ExportError: the argument is neither a text nor a path.
@@ -66,6 +69,10 @@ def whole_file(path: PathLike, remedy: str = "choose a writable place") -> Itera
 def write_bytes(content: bytes, path: PathLike) -> None:
     """Write a file completely or not at all.
 
+    Args:
+        content: content of the file.
+        path: file to write.
+
     Raises:
         ExportError: the file cannot be written.
     """
@@ -76,6 +83,10 @@ def write_bytes(content: bytes, path: PathLike) -> None:
 def write_sealed(content: bytes, path: PathLike) -> None:
     """Write a file that begins with a hash of its content, for `read_sealed`.
 
+    Args:
+        content: content of the file.
+        path: file to write.
+
     Raises:
         ExportError: the file cannot be written.
     """
@@ -83,7 +94,10 @@ def write_sealed(content: bytes, path: PathLike) -> None:
 
 
 def read_sealed(path: PathLike) -> bytes:
-    """Return the content of a file of `write_sealed`.
+    """Return the content of a file that `write_sealed` wrote, without the hash.
+
+    Args:
+        path: file to read.
 
     Raises:
         OSError: the file does not exist or cannot be read.
@@ -97,6 +111,10 @@ def read_sealed(path: PathLike) -> bytes:
 
 def write_text(text: str, path: PathLike) -> None:
     """Write a text file in UTF-8 completely or not at all, with its line ends unchanged.
+
+    Args:
+        text: content of the file.
+        path: file to write.
 
     Raises:
         ExportError: the file cannot be written.
@@ -185,10 +203,14 @@ def check_archive(path: Path) -> None:
 
 
 def _leads_outside(name: str) -> bool:
-    """Return whether a name has `..`, a drive, a leading slash, a backslash or a null character."""
+    """Return whether an entry name could lead out of the folder in which it is unpacked.
+
+    It then has `..`, a drive, a leading slash, a backslash or a null character.
+    """
     parts = PurePosixPath(name).parts
     return ".." in parts or name.startswith("/") or any(sign in name for sign in "\\:\0")
 
 
 def _size(count: int) -> str:
+    """Return a number of bytes as text in GB or MB."""
     return f"{count / 1e9:.2g} GB" if count >= 1e9 else f"{count / 1e6:.2g} MB"

@@ -21,7 +21,7 @@ finite, and it is below the square of every physical length and speed."""
 
 
 def doubles(value: Any) -> NDArray[np.float64] | str:
-    """Return the numbers in a value as an array of doubles.
+    """Return the numbers in a value as an array of doubles, or an error text.
 
     Args:
         value: any value. Integers, booleans and shorter floats are converted.
@@ -43,7 +43,7 @@ def doubles(value: Any) -> NDArray[np.float64] | str:
 
 
 def numbers_given(value: Any) -> NDArray[np.float64] | str:
-    """Return the numbers in a value as `doubles` does, but reject True and False.
+    """Return the numbers in a value as `doubles` does, but with an error text for True and False.
 
     Args:
         value: positions, velocities, efforts, parameters or limits that a user gives.
@@ -57,7 +57,7 @@ def numbers_given(value: Any) -> NDArray[np.float64] | str:
 
 
 def has_boolean(value: Any) -> bool:
-    """Return whether a value is True or False, or an array or a nested list with one of them."""
+    """Return whether a value is True or False, or contains one of them (array, nested list)."""
     if isinstance(value, (list, tuple)):
         return any(map(has_boolean, value))
     if isinstance(value, np.ndarray):
@@ -66,7 +66,7 @@ def has_boolean(value: Any) -> bool:
 
 
 def is_vector(shape: tuple[int, ...]) -> bool:
-    """Return whether an array of this shape is one number, a row or a column.
+    """Return whether an array of a shape is one number, a row or a column.
 
     The elements of a matrix have two orders, by rows in NumPy and by columns in CasADi.
     """
@@ -74,7 +74,7 @@ def is_vector(shape: tuple[int, ...]) -> bool:
 
 
 def on_arrays(function: Function) -> OnArrays:
-    """Return a Function of arrays, for many evaluations.
+    """Return a callable that evaluates a Function on arrays, for many evaluations.
 
     A call by CasADi checks the type of every argument and copies every result twice, which takes as
     long as a thousand operations. The returned callable reads and writes the arrays directly. Each
@@ -119,7 +119,10 @@ def on_arrays(function: Function) -> OnArrays:
 def _filled(
     values: Array, shape: tuple[int, int], places: tuple[list[int], list[int]] | None
 ) -> Array:
-    """Return the matrix with elements at the given places, column by column if at all places."""
+    """Return the matrix of a shape with the elements `values`, zero elsewhere.
+
+    `places` are row and column indices of the elements; None if every element has a value.
+    """
     if places is None:
         return np.ascontiguousarray(values.reshape(shape[::-1]).T)
     full = np.zeros(shape)

@@ -34,6 +34,7 @@ Check = Callable[[str, object], str]
 
 
 def _always_valid(label: str, value: object) -> str:
+    """Return "": the check of an option whose values are all valid."""
     return ""
 
 
@@ -94,7 +95,9 @@ ValueKind = Literal["flag", "number", "names", "choice", "text"]
 
 
 def value_kinds(options: type) -> dict[str, ValueKind]:
-    """Return the kind of values of each option, by name. Options of other types are left out.
+    """Return the kind of values of each option of a dataclass, by name.
+
+    Options of other types than those of `ValueKind` are left out.
 
     Args:
         options: dataclass of the options.
@@ -118,14 +121,23 @@ def _kind(hint: Any, option: OptionInfo) -> ValueKind | None:
 
 
 def default_text(field: Field[Any]) -> str:
-    """Return the default of a number as its shortest text: 10, 0.01, 1e-8. "" if it is None."""
+    """Return the default of a number as its shortest text: 10, 0.01, 1e-8; "" for None.
+
+    Args:
+        field: dataclass field whose default is a number or None.
+    """
     if field.default is None:
         return ""
     return f"{field.default:g}".replace("e-0", "e-").replace("e+0", "e+")
 
 
 def title_of(name: str, option: OptionInfo) -> str:
-    """Return the label of an option with a capital letter and its unit."""
+    """Return the label of an option with a capital letter and its unit, such as "Stop time [s]".
+
+    Args:
+        name: name of the option, used without underscores if it has no label.
+        option: description of the option.
+    """
     label = option.label or name.replace("_", " ")
     unit = f" [{option.unit}]" if option.unit else ""
     return f"{label[:1].upper()}{label[1:]}{unit}"
@@ -134,7 +146,7 @@ def title_of(name: str, option: OptionInfo) -> str:
 def described(
     text: str, choices: Mapping[str, str] | None = None, **about: Any
 ) -> dict[str, OptionInfo]:
-    """Return the metadata of a field.
+    """Return the metadata of a dataclass field that is an option.
 
     Args:
         text: meaning, and allowed values.
@@ -145,7 +157,7 @@ def described(
 
 
 def option_of(field: Field[Any]) -> OptionInfo:
-    """Return the description of a field. The default label is the name of the field."""
+    """Return the description of a dataclass field that is an option."""
     option: OptionInfo = field.metadata[_KEY]
     return option
 
@@ -180,7 +192,7 @@ def faults(options: Any) -> Iterator[str]:
 
 
 def group_values(options: Any, *groups: type) -> dict[str, Any]:
-    """Return the values of the options that groups of options have, by name.
+    """Return the values of those options that groups (base classes) of options have, by name.
 
     Args:
         options: instance of a dataclass that is derived from the groups.
@@ -281,7 +293,7 @@ def _passed(field: Field[Any]) -> str:
 
 
 def _documented(doc: str, every: Sequence[Field[Any]]) -> str:
-    """Replace the entry `options` of the section Args by the entries of the fields."""
+    """Return a docstring in which the entry `options` is replaced by one entry per option."""
     lines = []
     for line in doc.splitlines():
         if line.strip().startswith("options: "):

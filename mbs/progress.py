@@ -17,10 +17,12 @@ _LISTENER: ContextVar[Listener | None] = ContextVar("listener", default=None)
 
 @contextmanager
 def listen(listener: Listener) -> Iterator[None]:
-    """Report the progress of every run within the block to a function, even of quiet runs.
+    """Context manager that reports the progress of every run in its block to a function.
+
+    Quiet runs are reported too.
 
     Args:
-        listener: function that is called in the thread of the run at each report.
+        listener: function of label and completed fraction, called in the thread of the run.
     """
     token = _LISTENER.set(listener)
     try:
@@ -33,7 +35,9 @@ def listen(listener: Listener) -> Iterator[None]:
 def progress(
     label: str, start: float, stop: float, *, quiet: bool = False
 ) -> Iterator[Callable[[float], None]]:
-    """Provide a function that reports progress; after two seconds it shows a bar on a terminal.
+    """Context manager that yields a function to report progress.
+
+    After two seconds it shows a bar on a terminal.
 
     Args:
         label: name of the run.
@@ -47,13 +51,13 @@ def progress(
     bar = _DelayedBar(label, start, stop, shown=not quiet and sys.stderr.isatty())
     listener = _LISTENER.get()
     try:
-        yield bar.reach if listener is None else _told(bar, listener)
+        yield bar.reach if listener is None else _with_listener(bar, listener)
     finally:
         bar.close()
 
 
 class _DelayedBar:
-    """A progress bar of rich that is created after a waiting time."""
+    """Progress bar of rich that is created after a waiting time of two seconds."""
 
     def __init__(self, label: str, start: float, stop: float, *, shown: bool) -> None:
         self.label = label
@@ -64,6 +68,7 @@ class _DelayedBar:
         self._task: Any = None
 
     def reach(self, simulated: float) -> None:
+        """Show the value `simulated` on the bar; the bar is opened if the waiting time is over."""
         if self._bar is None:
             if time.monotonic() < self._due:
                 return
@@ -71,15 +76,17 @@ class _DelayedBar:
         self._bar.update(self._task, completed=simulated - self._start)
 
     def part(self, simulated: float) -> float:
-        """Return the completed fraction, 0 to 1."""
+        """Return the completed fraction, 0 to 1, at the value `simulated`."""
         whole = self._stop - self._start
         return min(max((simulated - self._start) / whole, 0.0), 1.0) if whole > 0 else 1.0
 
     def close(self) -> None:
+        """Remove the bar, if it was opened."""
         if self._bar is not None:
             self._bar.stop()
 
     def _open(self) -> None:
+        """Create the bar and show it on stderr."""
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -95,8 +102,8 @@ class _DelayedBar:
         self._bar.start()
 
 
-def _told(bar: _DelayedBar, listener: Listener) -> Callable[[float], None]:
-    """Return a function that updates the bar and calls the listener."""
+def _with_listener(bar: _DelayedBar, listener: Listener) -> Callable[[float], None]:
+    """Return a function of the reached value that updates the bar and calls the listener."""
 
     def reach(simulated: float) -> None:
         bar.reach(simulated)

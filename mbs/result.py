@@ -94,31 +94,59 @@ class RecordedStates:
     modes: Array
 
     def at(self, row: int, time: float, name: str) -> State:
-        """Return the state of a row."""
+        """Return the state of a row.
+
+        Args:
+            row: index of the row.
+            time: time of the row [s].
+            name: name of the mechanism.
+        """
         values = iter(self.x[row].tolist())
         q, v, z = ({one: next(values) for one in names} for names in self.names)
         return State(q, v, z, tuple(self.modes[row].tolist()), time, name)
 
 
 def state_of(given: Any) -> Any:
-    """Return the last state of a `Result`; any other value unchanged."""
+    """Return the last state of a `Result`; any other value is returned unchanged.
+
+    Args:
+        given: argument of a user: a `Result`, a `State` or another value.
+    """
     return given.state() if isinstance(given, Result) else given
 
 
 def positions_of(given: Any) -> Any:
-    """Return the positions by name of a `State`, or of the last state of a `Result`."""
+    """Return the positions by name of a `State`, or of the last state of a `Result`.
+
+    Any other value is returned unchanged.
+
+    Args:
+        given: argument of a user: a `Result`, a `State` or another value.
+    """
     given = state_of(given)
     return given.q if isinstance(given, State) else given
 
 
 def velocities_of(given: Any) -> Any:
-    """Return the velocities by name of a `State`, or of the last state of a `Result`."""
+    """Return the velocities by name of a `State`, or of the last state of a `Result`.
+
+    Any other value is returned unchanged.
+
+    Args:
+        given: argument of a user: a `Result`, a `State` or another value.
+    """
     given = state_of(given)
     return given.v if isinstance(given, State) else given
 
 
 def device_states_of(given: Any) -> Any:
-    """Return the states of components by name of a `State` or the last state of a `Result`."""
+    """Return the states of components by name of a `State`, or of the last state of a `Result`.
+
+    Any other value is returned unchanged.
+
+    Args:
+        given: argument of a user: a `Result`, a `State` or another value.
+    """
     given = state_of(given)
     return given.z if isinstance(given, State) else given
 
@@ -195,9 +223,11 @@ class Result:
             raise ModelError(f"result {self.name!r}: t [s] is {quoted(t)}; give the time of a row")
         if t is not None:
             row = int(np.searchsorted(self.time, float(t), side="right")) - 1
-            near = min((k for k in (row, row + 1) if 0 <= k < len(self.time)), key=self._far(t))
+            near = min(
+                (k for k in (row, row + 1) if 0 <= k < len(self.time)), key=self._distance_from(t)
+            )
             # times are sums of steps, with rounding errors
-            if self._far(t)(near) > 1e-9 * max(1.0, abs(float(t))):
+            if self._distance_from(t)(near) > 1e-9 * max(1.0, abs(float(t))):
                 raise ModelError(
                     f"result {self.name!r}: there is no row at {float(t)!r} s, the nearest is at"
                     f" {float(self.time[near])!r} s; take this one, or give run another step"
@@ -205,7 +235,8 @@ class Result:
             row = int(np.flatnonzero(self.time == self.time[near])[-1])
         return self.states.at(row, float(self.time[row]), self.name)
 
-    def _far(self, t: float) -> Callable[[int], float]:
+    def _distance_from(self, t: float) -> Callable[[int], float]:
+        """Return a function from a row index to the distance [s] of its time from t."""
         return lambda row: abs(float(self.time[row]) - float(t))
 
     @classmethod
@@ -265,6 +296,9 @@ class Result:
 
         Args:
             path: file to write. It is replaced completely or not at all.
+
+        Raises:
+            ExportError: the file cannot be written.
         """
         rows = np.column_stack([self.time, self.values]).tolist()
         with whole_file(path) as scratch, scratch.open("w", newline="", encoding="utf-8") as stream:
@@ -278,9 +312,7 @@ class Result:
         Args:
             path: file to write, such as run.npz. It is replaced completely or not at all.
 
-        Raises:
-            ExportError: the file cannot be written.
-            ExportError: the file cannot be written.
+        REPLACE_RAISES
         """
         rest = {
             "name": self.name,
@@ -324,6 +356,9 @@ class Result:
         """Return the signals as a pandas DataFrame indexed by time.
 
         Units are in `.attrs["units"]`, and the reason of an early stop is in `.attrs["stopped"]`.
+
+        Raises:
+            ModelError: pandas is not installed.
         """
         pandas = optional_module("pandas", "tables")
         index = pandas.Index(self.time, name="time")
@@ -334,7 +369,11 @@ class Result:
         return frame
 
     def to_xarray(self) -> Any:
-        """Return the signals as an xarray Dataset over time, each with its unit as attribute."""
+        """Return the signals as an xarray Dataset over time, each with its unit as attribute.
+
+        Raises:
+            ModelError: xarray is not installed.
+        """
         xarray = optional_module("xarray", "tables")
         signals = {n: ("time", self[n].copy(), {"units": u}) for n, u in self.units.items()}
         stop = {} if self.stopped is None else {"stopped": self.stopped[1]}
@@ -383,6 +422,7 @@ class Result:
         return figure
 
     def _index(self, name: str) -> int:
+        """Return the column of the signal `name`; raise ModelError if it is unknown."""
         if not isinstance(name, str) or name not in self.units:
             raise ModelError(
                 f"result {self.name!r} has no signal {name!r}; it has {', '.join(self.names)}"
@@ -391,18 +431,20 @@ class Result:
 
 
 def _freeze(values: npt.ArrayLike) -> Array:
+    """Return a read-only copy of values as an array of floats."""
     array = np.array(values, dtype=float)
     array.flags.writeable = False
     return array
 
 
 def _label(unit: str) -> str:
+    """Return the axis label of a unit: quantity and unit, such as "torque [N.m]"."""
     quantity = _QUANTITIES.get(unit, "value")
     return quantity if unit == "1" else f"{quantity} [{unit}]"
 
 
 def optional_module(module: str, extra: str) -> Any:
-    """Return a module of an optional dependency of this package.
+    """Return a module of an optional dependency of this package, imported at this call.
 
     Args:
         module: name of the module.
@@ -418,6 +460,10 @@ def optional_module(module: str, extra: str) -> Any:
 
 
 def _figure(rows: int, *, shown: bool) -> Any:
+    """Return a new matplotlib Figure for `rows` panels; with pyplot if it is shown.
+
+    Raise ModelError if matplotlib is missing.
+    """
     # inches: width of a text page, flat panels, and space for the title and the time axis
     size = (8.0, 1.0 + 2.5 * max(rows, 1))
     optional_module("matplotlib", "plot")
@@ -429,6 +475,7 @@ def _figure(rows: int, *, shown: bool) -> Any:
 
 
 def _save(figure: Any, path: str | os.PathLike[str]) -> None:
+    """Write a figure to a file, in the format of its ending; raise ExportError if it fails."""
     remedy = "give a .png, .svg or .pdf file in a folder that you may write"
     with whole_file(path, remedy) as scratch:
         try:

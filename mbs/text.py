@@ -16,7 +16,7 @@ _MOST_COMPARED = 1000
 
 
 def quoted(value: object) -> str:
-    """Return the repr of a value on one line, with the middle of a long text left out."""
+    """Return the repr of a value on one line, shortened to about 80 characters."""
     try:
         text = " ".join(repr(value).split())
     except ValueError:  # an integer with more digits than Python converts
@@ -25,19 +25,23 @@ def quoted(value: object) -> str:
 
 
 def shortened(text: str) -> str:
-    """Return the text, with the middle of a long text left out."""
+    """Return the text, with the middle left out if it is longer than 80 characters."""
     half = _LONGEST_QUOTE // 2
     return text if len(text) <= _LONGEST_QUOTE else f"{text[:half]}...{text[-half:]}"
 
 
 def listed(names: Sequence[str]) -> str:
-    """Return names as an enumeration: "a", "a and b", "a, b and c"."""
+    """Return names as an enumeration: "a", "a and b", "a, b and c". At least one is required."""
     *first, last = names
     return f"{', '.join(first)} and {last}" if first else last
 
 
 def without_values(names: Sequence[str]) -> str:
-    """Return the message about parameters without value, and how to give values."""
+    """Return the error message about parameters without value, with the remedy.
+
+    Args:
+        names: names of the parameters, at least one.
+    """
     values = ", ".join(f"{name!r}: 1.0" for name in names)
     how = f"such as mbs.load(source, parameters={{{values}}}), or in the call"
     if len(names) == 1:
@@ -61,7 +65,7 @@ def install_command(extra: str) -> str:
 
 
 def did_you_mean(name: object, known: Iterable[str]) -> str:
-    """Return the end of an error message about an unknown name.
+    """Return the end of an error message about an unknown name, such as "did you mean 'j1'?".
 
     Args:
         name: unknown name.
@@ -104,7 +108,7 @@ def one_line(text: str) -> str:
 
 
 def error_text(error: BaseException) -> str:
-    """Return type and first line of an error, such as "KeyError: 'gain'".
+    """Return type and first line of an error, such as "KeyError: 'gain'", at most 200 characters.
 
     Errors of CasADi have further lines with prototypes and code.
     """
@@ -121,7 +125,7 @@ def seen(text: str) -> str:
 
 
 def ascii_line(text: str) -> str:
-    """Return the text on one line in ASCII, without accents, as every compiler accepts it."""
+    """Return the text on one line in ASCII: accents and other characters are removed."""
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode("ascii")
     return one_line(plain)
 
@@ -132,7 +136,7 @@ def in_c_comment(text: str) -> str:
 
 
 def in_line_comment(text: str) -> str:
-    """Return the text for a comment that extends to the end of the line.
+    """Return the text for a comment up to the end of the line: as for a comment of C.
 
     A backslash at the end of the line would join the next line in C, Rust and Maple. A Fortran
     preprocessor interprets comments of C.
@@ -156,6 +160,7 @@ def in_docstring(text: str) -> str:
 
 
 def _without_backslashes(text: str) -> str:
+    """Return the text on one line, with slashes in place of backslashes."""
     return one_line(text).replace("\\", "/")
 
 

@@ -91,7 +91,7 @@ class _Units(Mapping[str, Unit]):
 
 
 def _exponents(name: str) -> dict[str, int]:
-    """Return the exponents of base units of a product such as "kg/m" or "m3/s".
+    """Return the exponents of base units of a product of units, such as "kg/m" or "m3/s".
 
     Raises:
         KeyError: the name is no product of known units.
@@ -117,5 +117,5 @@ UNITS: Mapping[str, Unit] = _Units(_UNITS)
 
 
 def rate_unit(unit: str) -> str:
-    """Return the unit of the time derivative of a quantity with this unit."""
+    """Return the unit of the time derivative of a quantity: "m/s" for "m", "N.m/s" for "N.m"."""
     return f"{unit}.s" if "/" in unit else f"{unit}/s"

@@ -16,7 +16,7 @@ from casadi import SX
 
 from mbs.components import custom
 from mbs.components.component import Component
-from mbs.components.custom import Custom, Event
+from mbs.components.custom import At, Custom, Event
 from mbs.errors import DescriptionError
 from mbs.expressions import expression, to_float, to_sx
 from mbs.text import quoted
@@ -28,14 +28,14 @@ class SignalBlock(Custom):
 
     def _require_order(self) -> None:
         """Raise DescriptionError if `low` and `high` are both numbers and low is not below high."""
-        below, above = (self._number(name) for name in ("low", "high"))
+        below, above = (self._parameter_value(name) for name in ("low", "high"))
         if below is not None and above is not None and below >= above:
             raise DescriptionError(
                 f"{self.name}: low is {below:g} and high is {above:g}; give them in order"
             )
 
-    def _number(self, name: str) -> float | None:
-        """Return the numeric value of a parameter; None if it is symbolic or left out."""
+    def _parameter_value(self, name: str) -> float | None:
+        """Return the numeric value of the parameter `name`; None if it is symbolic or left out."""
         given = getattr(self, name)
         return None if given is None else to_float(given)
 
@@ -76,8 +76,12 @@ class Constant(SignalBlock):
     value = custom.parameter()
     y = custom.output()
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": value}."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"y": value}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"y": at.value}
 
 
@@ -92,8 +96,12 @@ class Gain(SignalBlock):
     u = custom.input()
     y = custom.output()
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": k u}."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"y": k u}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"y": at.k * at.u}
 
 
@@ -133,8 +141,12 @@ class Sum(SignalBlock):
         """Names of the used inputs: the first of u1 .. u4, one per weight."""
         return ("u1", "u2", "u3", "u4")[: len(self.weights)]
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": sum of weight times input}."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"y": sum of weight times input}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         pairs = zip(self.weights, self.input_names, strict=True)
         return {"y": sum((to_sx(w, at.symbols) * getattr(at, u) for w, u in pairs), SX(0))}
 
@@ -165,15 +177,35 @@ class Limiter(SignalBlock):
             )
         self._require_order()
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": u limited to the range from low to high}."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"y": u limited to the range from low to high}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"y": saturate(at.u, at.low, at.high, at.width)}
 
 
 # Blocks with states, without limits.
 
 
-class Integrator(SignalBlock):
+class _FilterBlock(SignalBlock):
+    """Base of blocks with the input u and the output y = x, a state."""
+
+    x = custom.state()
+    u = custom.input()
+    y = custom.output()
+
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"y": x}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
+        return {"y": at.x}
+
+
+class Integrator(_FilterBlock):
     """y = x, dx/dt = k u.
 
     Attributes:
@@ -181,20 +213,17 @@ class Integrator(SignalBlock):
     """
 
     k = custom.parameter("1/s", 1.0)
-    x = custom.state()
-    u = custom.input()
-    y = custom.output()
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"x": k u}."""
+    def rates(self, at: At) -> Mapping[str, SX]:
+        """Return {"x": k u}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"x": at.k * at.u}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": x}."""
-        return {"y": at.x}
 
-
-class FirstOrder(SignalBlock):
+class FirstOrder(_FilterBlock):
     """A first-order filter: y = x, time dx/dt = k u - x.
 
     Attributes:
@@ -204,20 +233,17 @@ class FirstOrder(SignalBlock):
 
     time = custom.parameter("s", positive=True)
     k = custom.parameter("1", 1.0)
-    x = custom.state()
-    u = custom.input()
-    y = custom.output()
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"x": (k u - x) / time}."""
+    def rates(self, at: At) -> Mapping[str, SX]:
+        """Return {"x": (k u - x) / time}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"x": (at.k * at.u - at.x) / at.time}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": x}."""
-        return {"y": at.x}
 
-
-class SecondOrder(SignalBlock):
+class SecondOrder(_FilterBlock):
     """A second-order filter: y = x, x'' + 2 damping w x' + w^2 x = w^2 k u.
 
     Attributes:
@@ -229,22 +255,19 @@ class SecondOrder(SignalBlock):
     w = custom.parameter("rad/s", positive=True)
     damping = custom.parameter("1", 1.0, min=0)
     k = custom.parameter("1", 1.0)
-    x = custom.state()
     v = custom.state("1/s")
-    u = custom.input()
-    y = custom.output()
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"x": v, "v": w^2 (k u - x) - 2 damping w v}."""
+    def rates(self, at: At) -> Mapping[str, SX]:
+        """Return {"x": v, "v": w^2 (k u - x) - 2 damping w v}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         pull = at.w**2 * (at.k * at.u - at.x)
         return {"x": at.v, "v": pull - 2 * at.damping * at.w * at.v}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": x}."""
-        return {"y": at.x}
 
-
-class RateLimiter(SignalBlock):
+class RateLimiter(_FilterBlock):
     """A signal that follows the input with a limited rate: y = x, dx/dt = (u - x) / time.
 
     The rate is limited to the range from `-falling` to `rising`. Below the limits y lags by `time`.
@@ -260,18 +283,15 @@ class RateLimiter(SignalBlock):
     time = custom.parameter("s", positive=True)
     falling = custom.parameter("1/s", None, positive=True)
     width = custom.parameter("1/s", 0.0, min=0)
-    x = custom.state()
-    u = custom.input()
-    y = custom.output()
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"x": (u - x) / time limited to the range from -falling to rising}."""
+    def rates(self, at: At) -> Mapping[str, SX]:
+        """Return {"x": (u - x) / time limited to the range from -falling to rising}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         down = at.rising if at.falling is None else at.falling
         return {"x": saturate((at.u - at.x) / at.time, -down, at.rising, at.width)}
-
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": x}."""
-        return {"y": at.x}
 
 
 # Controllers.
@@ -306,7 +326,7 @@ class ErrorController(SignalBlock):
 
     def _require_ratio(self) -> None:
         """Raise DescriptionError if the default of `tracking`, kp / ki, is not a positive time."""
-        found = {name: self._number(name) for name in ("kp", "ki")}
+        found = {name: self._parameter_value(name) for name in ("kp", "ki")}
         known = {name: gain for name, gain in found.items() if gain is not None}
         if 0 in known.values() or (len(known) == 2 and known["kp"] * known["ki"] < 0):
             gains = " and ".join(f"{name} is {gain:g}" for name, gain in known.items())
@@ -315,10 +335,13 @@ class ErrorController(SignalBlock):
                 " the limits; give tracking"
             )
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return {"x": ki e, plus (u - u0) / tracking if the output has limits}.
 
         u is the limited output and u0 the output before the limits.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         rate = at.ki * (at.target - at.measured)
         if at.low is not None or at.high is not None:
@@ -326,16 +349,20 @@ class ErrorController(SignalBlock):
             rate += (self._saturate(at) - self._command(at)) / tracking
         return {"x": rate}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"u": output, limited to the range from low to high}."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"u": output, limited to the range from low to high}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"u": self._saturate(at)}
 
-    def _saturate(self, at: Any) -> SX:
-        """Return the output limited to the range from low to high."""
+    def _saturate(self, at: At) -> SX:
+        """Return the output: the result of `_command`, limited to the range from low to high."""
         return saturate(self._command(at), at.low, at.high, SX(0))
 
-    def _command(self, at: Any) -> SX:
-        """Return u0, the output before the limits."""
+    def _command(self, at: At) -> SX:
+        """Return the output before the limits; a subclass defines it."""
         raise NotImplementedError
 
 
@@ -356,7 +383,8 @@ class PI(ErrorController):
     tracking = custom.parameter("s", None, positive=True)
     x = custom.state()
 
-    def _command(self, at: Any) -> SX:
+    def _command(self, at: At) -> SX:
+        """Return kp e + x, the output before the limits, with e = target - measured."""
         return SX(at.kp * (at.target - at.measured) + at.x)
 
 
@@ -384,12 +412,20 @@ class PID(ErrorController):
     x = custom.state()
     f = custom.state()
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rates of the integral part "x" and of the filtered error "f"."""
+    def rates(self, at: At) -> Mapping[str, SX]:
+        """Return the rates of the integral part "x" and of the filtered error "f".
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         error = at.target - at.measured
         return {**ErrorController.rates(self, at), "f": (error - at.f) / at.filter}
 
-    def _command(self, at: Any) -> SX:
+    def _command(self, at: At) -> SX:
+        """Return kp e + x + kd (e - f) / filter, the output before the limits.
+
+        e is target - measured.
+        """
         error = at.target - at.measured
         return SX(at.kp * error + at.x + at.kd * (error - at.f) / at.filter)
 
@@ -402,16 +438,27 @@ class SampledBlock(SignalBlock):
 
     left = custom.state("s")
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"left": -1}: the time to the next sample decreases by one second per second."""
+    def rates(self, at: At) -> Mapping[str, SX]:
+        """Return {"left": -1}: the time to the next sample decreases by one second per second.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"left": SX(-1)}
 
-    def events(self, at: Any) -> Mapping[str, Event]:
-        """Return the event "samples" at left = 0, which resets `left` and sets sampled modes."""
+    def events(self, at: At) -> Mapping[str, Event]:
+        """Return the event "samples" at left = 0, which resets `left` and sets sampled modes.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"samples": Event(at.left, {"left": at.period, **self._sample(at)})}
 
-    def _sample(self, at: Any) -> Mapping[str, SX]:
-        """Return the new value of each mode at a sampling instant, by name."""
+    def _sample(self, at: At) -> Mapping[str, SX]:
+        """Return the new values of modes at a sampling instant, by name.
+
+        A subclass defines them.
+        """
         raise NotImplementedError
 
 
@@ -427,11 +474,16 @@ class SampleHold(SampledBlock):
     y = custom.output()
     sample = custom.mode()
 
-    def _sample(self, at: Any) -> Mapping[str, SX]:
+    def _sample(self, at: At) -> Mapping[str, SX]:
+        """Return {"sample": u}: the mode gets the present input."""
         return {"sample": at.u}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": u at the last sampling instant}."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"y": u at the last sampling instant}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"y": at.sample}
 
 
@@ -468,7 +520,8 @@ class SampledPID(SampledBlock):
         Custom.__post_init__(self)
         self._require_order()
 
-    def _sample(self, at: Any) -> Mapping[str, SX]:
+    def _sample(self, at: At) -> Mapping[str, SX]:
+        """Return the output "sample", integral part "x" and error "error" at a sampling instant."""
         error = at.target - at.measured
         more = at.x + at.ki * error * at.period
         given = at.kp * error + at.kd * (error - at.error) / at.period
@@ -479,6 +532,10 @@ class SampledPID(SampledBlock):
         x = casadi.if_else(outwards, at.x, more)
         return {"sample": saturate(given + x, at.low, at.high, SX(0)), "x": x, "error": error}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"u": output computed at the last sampling instant, within the limits}."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"u": output computed at the last sampling instant, within the limits}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"u": at.sample}

@@ -46,7 +46,12 @@ GROUPED = (
 
 
 def check_mass(name: str, mass: Scalar) -> None:
-    """Raise DescriptionError if a mass is a negative number."""
+    """Raise DescriptionError if a mass is a negative number; symbolic masses pass.
+
+    Args:
+        name: name of the body, for the message.
+        mass: mass [kg].
+    """
     value = to_float(mass)
     if value is not None and value < 0:
         raise DescriptionError(f"{name}: mass is {value:g} kg; give zero or more")
@@ -55,7 +60,8 @@ def check_mass(name: str, mass: Scalar) -> None:
 def _require_mass(name: str, kind: str, given: Scalar | None, other: str = "") -> Scalar:
     """Return `given`, the mass or density of a body. Raise DescriptionError if it is None.
 
-    `kind` is the class of the body and `other` the second possible field, for the message.
+    `name` and `kind` are name and class of the body and `other` the second possible field, for the
+    message.
     """
     if given is None:
         ways = f"mass= [kg] or {other} [kg/m^3]" if other else "mass= [kg]"
@@ -68,11 +74,11 @@ def _require_mass(name: str, kind: str, given: Scalar | None, other: str = "") -
 def check_tensor(
     name: str, six: Iterable[Scalar], scale: float = 0.0, remedy: str = "give a positive tensor"
 ) -> None:
-    """Raise DescriptionError if a principal moment of inertia about the centre of mass is negative.
+    """Raise DescriptionError if a principal moment of inertia is a negative number.
 
     Args:
         name: name of the body, for the message.
-        six: Ixx Ixy Ixz Iyy Iyz Izz.
+        six: Ixx Ixy Ixz Iyy Iyz Izz about the centre of mass [kg m^2].
         scale: magnitude of the terms from which `six` was subtracted, which sets the rounding
             error.
         remedy: end of the message.
@@ -102,7 +108,10 @@ def tensor_fault(six: Iterable[Scalar], scale: float = 0.0) -> str:
 
 
 def _principal_moments(six: Iterable[Scalar]) -> tuple[float, float, float]:
-    """Return the principal moments [kg m^2] in ascending order; zeros if an element is symbolic."""
+    """Return the principal moments [kg m^2] in ascending order; zeros if an element is symbolic.
+
+    `six` are Ixx Ixy Ixz Iyy Iyz Izz.
+    """
     numbers = [value for value in map(to_float, six) if value is not None]
     if len(numbers) < 6:
         return 0.0, 0.0, 0.0
@@ -117,9 +126,14 @@ def tensor_matrix(six: list[float]) -> Any:
 
 
 def three(values: Any, where: str) -> tuple[Expression, ...]:
-    """Return (x, y, z) of a vector as expressions.
+    """Return the elements (x, y, z) of a vector as expressions.
 
-    Raise DescriptionError if it has not three values.
+    Args:
+        values: three numbers, texts or expressions.
+        where: name of the vector in messages.
+
+    Raises:
+        DescriptionError: there are not three values.
     """
     try:
         x, y, z = [] if isinstance(values, str) else list(values)
@@ -133,7 +147,12 @@ def three(values: Any, where: str) -> tuple[Expression, ...]:
 def six_of(values: Any, where: str) -> tuple[Expression, ...]:
     """Return Ixx Ixy Ixz Iyy Iyz Izz [kg m^2] of an inertia in any of three forms.
 
-    The forms are three principal moments, six elements, or a symmetric (3, 3) matrix.
+    Args:
+        values: three principal moments, six elements, or a symmetric (3, 3) matrix.
+        where: name of the inertia in messages.
+
+    Raises:
+        DescriptionError: the value has none of these forms, or the matrix is not symmetric.
     """
     flat: list[Any] = []
     for value in values if hasattr(values, "__len__") and not isinstance(values, str) else [values]:
@@ -168,7 +187,7 @@ def _equal(a: Expression, b: Expression) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class RigidBody(Component):
-    """A component with a reference frame, relative to which other frames are placed."""
+    """Component with a reference frame, relative to which other frames are placed."""
 
     @property
     def frame(self) -> Point:
@@ -178,13 +197,22 @@ class RigidBody(Component):
     def at(
         self, x: Scalar = 0, y: Scalar = 0, z: Scalar = 0, *, rotation: Rotation | None = None
     ) -> Point:
-        """Return the frame at (x, y, z) [m] in the reference frame, with its axes then rotated."""
+        """Return a frame that is displaced relative to the reference frame.
+
+        Args:
+            x: origin of the frame along x of the reference frame [m].
+            y: origin along y [m].
+            z: origin along z [m].
+            rotation: rotation of its axes relative to the reference frame; none by default.
+        """
         return self.frame.at(x, y, z, rotation=rotation)
 
     def at_khalil(self, **parameters: Scalar) -> Point:
-        """Return the frame at Khalil parameters relative to the reference frame.
+        """Return a frame that is placed by Khalil parameters relative to the reference frame.
 
-        Angles gamma, alpha, theta are in rad, lengths b, d, r in m.
+        Args:
+            parameters: any of the angles gamma, alpha, theta [rad] and the lengths b, d, r [m];
+                zero if left out.
         """
         return self.frame.at_khalil(**parameters)
 
@@ -197,7 +225,11 @@ class RigidBody(Component):
         return ""
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Return the inertia about the origin of the reference frame, in its axes (CasADi)."""
+        """Return the inertia about the origin of the reference frame, in its axes (CasADi).
+
+        Args:
+            symbols: CasADi symbol of each parameter, by name.
+        """
         raise NotImplementedError
 
 
@@ -217,7 +249,11 @@ class World(RigidBody):
         object.__setattr__(self, "gravity", three(self.gravity, f"{self.name}, gravity"))
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Return zero inertia: the world does not move."""
+        """Return zero inertia: the world does not move.
+
+        Args:
+            symbols: CasADi symbol of each parameter, by name.
+        """
         return Inertia.zero()
 
 
@@ -226,7 +262,11 @@ class Mount(RigidBody):
     """A massless frame: the ground of a nested mechanism, to be connected to a body."""
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Return zero inertia: a mount has no mass."""
+        """Return zero inertia: a mount has no mass.
+
+        Args:
+            symbols: CasADi symbol of each parameter, by name.
+        """
         return Inertia.zero()
 
 
@@ -266,14 +306,18 @@ class Body(RigidBody):
 
     @property
     def inertia_fault(self) -> str:
-        """Text on a violated triangle inequality.
+        """Reason why no real body has this inertia: a violated triangle inequality.
 
         Empty if there is no fault or `checked` is False.
         """
         return tensor_fault(self.inertia) if self.checked else ""
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Return the inertia about the origin of the reference frame, in its axes (CasADi)."""
+        """Return the inertia about the origin of the reference frame, in its axes (CasADi).
+
+        Args:
+            symbols: CasADi symbol of each parameter, by name.
+        """
         com = vector(to_sx(value, symbols) for value in self.com)
         tensor = Inertia.from_parameters(
             vector([*(to_sx(value, symbols) for value in self.inertia), 0, 0, 0, 0])
@@ -310,7 +354,7 @@ class KhalilBody(RigidBody):
         self._normalise(*TEN_PARAMETERS)
         if not self.grouped:
             check_mass(self.name, self.M)
-            six, scale = self._about_com()
+            six, scale = self._inertia_about_com()
             check_tensor(
                 self.name,
                 six,
@@ -320,13 +364,17 @@ class KhalilBody(RigidBody):
 
     @property
     def inertia_fault(self) -> str:
-        """Text on a violated triangle inequality; empty without a fault, or for grouped values."""
-        return "" if self.grouped else tensor_fault(*self._about_com())
+        """Reason why no real body has this inertia: a violated triangle inequality.
 
-    def _about_com(self) -> tuple[list[Scalar], float]:
-        """Return the inertia about the centre of mass, and the magnitude of its terms.
+        Empty if there is no fault, or for grouped values.
+        """
+        return "" if self.grouped else tensor_fault(*self._inertia_about_com())
 
-        The inertia is empty if a parameter has no value or the mass is zero.
+    def _inertia_about_com(self) -> tuple[list[Scalar], float]:
+        """Return the inertia about the centre of mass, and the magnitude of its terms [kg m^2].
+
+        The inertia is Ixx Ixy Ixz Iyy Iyz Izz, empty if a parameter has no value or the mass is
+        zero. Raise DescriptionError if a value is above 1e30 in SI units.
         """
         values = [to_float(getattr(self, name)) for name in TEN_PARAMETERS]
         numbers = [value for value in values if value is not None]
@@ -346,7 +394,11 @@ class KhalilBody(RigidBody):
         return [float(J[at]) for at in upper], float(max(abs(np.array(numbers[:6]))))
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Return the inertia about the origin of the reference frame, in its axes (CasADi)."""
+        """Return the inertia about the origin of the reference frame, in its axes (CasADi).
+
+        Args:
+            symbols: CasADi symbol of each parameter, by name.
+        """
         return Inertia.from_parameters(
             vector(to_sx(getattr(self, name), symbols) for name in TEN_PARAMETERS)
         )
@@ -369,7 +421,11 @@ class PointMass(RigidBody):
         check_mass(self.name, mass)
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Return mass only: no first moments and no moments of inertia about the origin."""
+        """Return mass only: no first moments and no moments of inertia about the origin.
+
+        Args:
+            symbols: CasADi symbol of each parameter, by name.
+        """
         zero = Inertia.zero()
         return Inertia(zero.J, zero.ms, to_sx(self.mass or 0, symbols))
 
@@ -411,7 +467,7 @@ class _Bar(RigidBody):
                 )
 
     def _mass(self, mass: Scalar | None, density: Scalar | None, volume: Expression) -> Expression:
-        """Return the mass [kg]: `mass`, or density [kg/m^3] times volume [m^3].
+        """Return the mass [kg] of a solid: `mass`, or density [kg/m^3] times volume [m^3].
 
         Raise DescriptionError unless exactly one of mass and density is given.
         """
@@ -427,9 +483,10 @@ class _Bar(RigidBody):
     def _solid_inertia(
         self, symbols: SymbolTable, mass: Expression, radii: list[Expression]
     ) -> Inertia:
-        """Return the inertia about the left end, in axes of the reference frame.
+        """Return the inertia about the left end, in axes of the reference frame (CasADi).
 
-        `radii` are the squared radii of gyration about x, y, z at the centre of mass [m^2].
+        `mass` [kg] is that of the solid, `radii` are the squared radii of gyration about x, y, z at
+        the centre of mass [m^2], and `symbols` the CasADi symbols of parameters by name.
         """
         com = vector([to_sx(expression(self.length) / 2, symbols), 0, 0])
         Ixx, Iyy, Izz = (to_sx(mass * radius, symbols) for radius in radii)
@@ -456,7 +513,7 @@ class Box(_Bar):
         Component.__post_init__(self)
         if self.height is None:
             object.__setattr__(self, "height", self.width)
-        self._normalise(*_given(self, "length", "width", "height", "density", "mass"))
+        self._normalise(*_given_fields(self, "length", "width", "height", "density", "mass"))
         self._check_solid(("length", "width", "height"))
         check_mass(self.name, self.solid_mass)
 
@@ -467,7 +524,11 @@ class Box(_Bar):
         return self._mass(self.mass, self.density, volume)
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Return the inertia about the left end, in axes of the reference frame (CasADi)."""
+        """Return the inertia about the left end, in axes of the reference frame (CasADi).
+
+        Args:
+            symbols: CasADi symbol of each parameter, by name.
+        """
         l2, w2, h2 = (expression(side or 0) ** 2 for side in (self.length, self.width, self.height))
         radii = [(w2 + h2) / 12, (l2 + h2) / 12, (l2 + w2) / 12]
         return self._solid_inertia(symbols, self.solid_mass, radii)
@@ -492,7 +553,7 @@ class Cylinder(_Bar):
 
     def __post_init__(self) -> None:
         Component.__post_init__(self)
-        self._normalise(*_given(self, "length", "radius", "inner_radius", "density", "mass"))
+        self._normalise(*_given_fields(self, "length", "radius", "inner_radius", "density", "mass"))
         self._check_solid(("length", "radius"))
         inner, outer = to_float(self.inner_radius), to_float(self.radius)
         if inner is not None and (inner < 0 or (outer is not None and inner >= outer)):
@@ -508,14 +569,18 @@ class Cylinder(_Bar):
         return self._mass(self.mass, self.density, area * self.length)
 
     def inertial(self, symbols: SymbolTable) -> Inertia:
-        """Return the inertia about the left end, in axes of the reference frame (CasADi)."""
+        """Return the inertia about the left end, in axes of the reference frame (CasADi).
+
+        Args:
+            symbols: CasADi symbol of each parameter, by name.
+        """
         squares = expression(self.radius) ** 2 + expression(self.inner_radius) ** 2
         across = squares / 4 + expression(self.length) ** 2 / 12
         return self._solid_inertia(symbols, self.solid_mass, [squares / 2, across, across])
 
 
-def _given(component: Component, *names: str) -> list[str]:
-    """Return the field names whose values are not None."""
+def _given_fields(component: Component, *names: str) -> list[str]:
+    """Return the names of fields of a component that are not None."""
     return [name for name in names if getattr(component, name) is not None]
 
 
@@ -554,7 +619,13 @@ _REVOLUTION = 2 * math.pi
 
 
 def notes_on_degrees(steps: Iterable[Step]) -> list[ImportNote]:
-    """Return a note "doubted" for each rotation by more than one revolution: probably degrees."""
+    """Return a note "doubted" for each rotation by more than one revolution.
+
+    Its angle is probably in degrees.
+
+    Args:
+        steps: displacement steps of a mount.
+    """
     angles = [
         (step.axis, to_float(step.angle)) for step in steps if isinstance(step, ElementaryRotation)
     ]

@@ -56,7 +56,11 @@ class Translation:
     z: Expression
 
     def pose(self, symbols: SymbolTable) -> Pose:
-        """Return the pose of the displaced frame relative to the previous frame."""
+        """Return the pose of the displaced frame relative to the previous frame.
+
+        Args:
+            symbols: CasADi symbol of each parameter, by name.
+        """
         return Pose.translation(vector(to_sx(value, symbols) for value in (self.x, self.y, self.z)))
 
 
@@ -68,7 +72,11 @@ class ElementaryRotation:
     angle: Expression
 
     def pose(self, symbols: SymbolTable) -> Pose:
-        """Return the pose of the rotated frame relative to the previous frame."""
+        """Return the pose of the rotated frame relative to the previous frame.
+
+        Args:
+            symbols: CasADi symbol of each parameter, by name.
+        """
         return Pose.about(self.axis, to_sx(self.angle, symbols))
 
 
@@ -79,7 +87,11 @@ class FixedRotation:
     rows: tuple[tuple[float, float, float], ...]
 
     def pose(self, symbols: SymbolTable) -> Pose:
-        """Return the pose of the rotated frame relative to the previous frame."""
+        """Return the pose of the rotated frame relative to the previous frame.
+
+        Args:
+            symbols: CasADi symbol of each parameter, by name.
+        """
         return Pose.rotation(SX(DM(self.rows)))
 
 
@@ -95,11 +107,19 @@ class KhalilStep:
     r: Expression
 
     def khalil(self, symbols: SymbolTable) -> Khalil:
-        """Return the six parameters as CasADi expressions."""
+        """Return the six parameters as CasADi expressions.
+
+        Args:
+            symbols: CasADi symbol of each parameter, by name.
+        """
         return Khalil(*(to_sx(getattr(self, f.name), symbols) for f in fields(self)))
 
     def pose(self, symbols: SymbolTable) -> Pose:
-        """Return the pose of frame j relative to its antecedent."""
+        """Return the pose of frame j relative to its antecedent.
+
+        Args:
+            symbols: CasADi symbol of each parameter, by name.
+        """
         return self.khalil(symbols).pose()
 
 
@@ -113,14 +133,18 @@ class Placement:
     steps: tuple[Step, ...] = ()
 
     def pose(self, symbols: SymbolTable) -> Pose:
-        """Return the pose of the placed frame relative to the start of the chain."""
+        """Return the pose of the placed frame relative to the start of the chain.
+
+        Args:
+            symbols: CasADi symbol of each parameter, by name.
+        """
         pose = Pose.identity()
         for step in self.steps:
             pose = pose @ step.pose(symbols)
         return pose
 
     def then(self, *steps: Step) -> Placement:
-        """Return the placement with `steps` appended at its end."""
+        """Return the placement followed by further steps."""
         return Placement(self.steps + steps)
 
     def inverse(self) -> Placement:
@@ -139,7 +163,11 @@ class Placement:
                     yield value
 
     def scoped(self, prefix: str) -> Placement:
-        """Return a copy whose parameters have the prefix "`prefix`."."""
+        """Return a copy whose parameters have the prefix "`prefix`.".
+
+        Args:
+            prefix: text before the names, without the dot.
+        """
         return Placement(tuple(_scoped(step, prefix) for step in self.steps))
 
 
@@ -171,9 +199,19 @@ Rotation = tuple[str, Scalar] | Sequence[tuple[str, Scalar]] | Sequence[Sequence
 def displacement(
     where: str, x: Scalar, y: Scalar, z: Scalar, rotation: Rotation | None
 ) -> tuple[Step, ...]:
-    """Return the steps of a translation by (x, y, z) [m], then a rotation by `rotation`.
+    """Return the steps of a translation by (x, y, z), then a rotation.
 
-    Zero translations and a rotation of None have no step. `where` is for error messages.
+    Zero translations and a rotation of None have no step.
+
+    Args:
+        where: name of the frame in error messages.
+        x: translation along x [m].
+        y: translation along y [m].
+        z: translation along z [m].
+        rotation: rotation, or None.
+
+    Raises:
+        DescriptionError: the rotation has no valid form.
     """
     values = [
         expression(value, f"{where}, {name}") for name, value in zip("xyz", (x, y, z), strict=True)
@@ -215,7 +253,10 @@ def in_rotated_axes(
 
 
 def _sum(products: Iterable[tuple[Scalar, Expression]]) -> Expression:
-    """Return the sum of products factor times value. Products with a zero are left out."""
+    """Return the sum of the products factor times value of the pairs.
+
+    Zero products are left out.
+    """
     total: Expression = Number(0.0)
     for factor, value in products:
         if 0 in (to_float(factor), to_float(value)):
@@ -226,9 +267,9 @@ def _sum(products: Iterable[tuple[Scalar, Expression]]) -> Expression:
 
 
 def _rotation_steps(where: str, rotation: Any) -> Iterable[Step]:
-    """Return the steps of a rotation in any form of `Rotation`.
+    """Return the steps of a rotation in any form of `Rotation`; raise DescriptionError for others.
 
-    Raise DescriptionError if invalid.
+    `where` is its name in the message.
     """
     if _is_turn(rotation):
         return [_elementary_rotation(where, *rotation)]
@@ -248,23 +289,30 @@ def _rotation_steps(where: str, rotation: Any) -> Iterable[Step]:
 
 
 def _is_turn(part: Any) -> bool:
-    """Return whether a value is a pair (axis letter, angle)."""
+    """Return whether a value is a pair (axis letter, angle) that describes a rotation."""
     return isinstance(part, (list, tuple)) and len(part) == 2 and isinstance(part[0], str)
 
 
 def _elementary_rotation(where: str, axis: str, angle: Scalar) -> ElementaryRotation:
-    """Return the rotation about an axis; raise DescriptionError if the axis is not x, y or z."""
+    """Return the rotation by `angle` [rad] about an axis "x", "y" or "z".
+
+    Raise DescriptionError for other axes. `where` is its name in the message.
+    """
     if axis not in ("x", "y", "z"):
         raise DescriptionError(f"{where}: rotation axis {axis!r} is not 'x', 'y' or 'z'; use one")
     return ElementaryRotation(axis, angle_expression(angle, f"{where}, rotation about {axis}"))
 
 
 def angle_expression(angle: Scalar, where: str) -> Expression:
-    """Return an angle [rad] as an expression; pi/2 with 11 or more digits becomes exact.
+    """Return an angle [rad] as an expression; 1.57079632679 and longer become exactly pi/2.
 
     A file with 1.57079632679 means pi/2. A deviation of 5e-12 would be an unintended tilt, which
     adds operations to every model. Multiples of pi/2 are treated in the same way. Numbers with
     fewer digits stay unchanged.
+
+    Args:
+        angle: number, text or expression.
+        where: name of the angle in error messages.
     """
     value = expression(angle, where)
     if not isinstance(value, Number):
@@ -304,7 +352,14 @@ class Point:
     def at(
         self, x: Scalar = 0, y: Scalar = 0, z: Scalar = 0, *, rotation: Rotation | None = None
     ) -> Point:
-        """Return the frame at (x, y, z) [m] in this frame; its axes are then rotated."""
+        """Return a frame that is displaced relative to this frame.
+
+        Args:
+            x: origin of the new frame along x of this frame [m].
+            y: origin along y [m].
+            z: origin along z [m].
+            rotation: rotation of its axes relative to this frame; none by default.
+        """
         steps = displacement(f"{self.owner.name}.at", x, y, z, rotation)
         return replace(self, placement=self.placement.then(*steps))
 
@@ -317,9 +372,19 @@ class Point:
         theta: Scalar = 0,
         r: Scalar = 0,
     ) -> Point:
-        """Return the frame at the parameters of Khalil & Kleinfinger 1986 relative to this frame.
+        """Return a frame that is placed by Khalil parameters relative to this frame.
 
-        gamma, alpha and theta are angles [rad]; b, d and r are lengths [m].
+        The placement is Rz(gamma) Tz(b) Rx(alpha) Tx(d) Rz(theta) Tz(r).
+
+        Source: Khalil & Kleinfinger 1986.
+
+        Args:
+            gamma: angle about z to the common perpendicular [rad].
+            b: distance along z to the common perpendicular [m].
+            alpha: angle between the z axes, about the common perpendicular [rad].
+            d: distance of the z axes, along the common perpendicular [m].
+            theta: angle about the new z axis [rad].
+            r: distance along the new z axis [m].
         """
         where = f"{self.owner.name}.at_khalil"
         values = (gamma, b, alpha, d, theta, r)
@@ -338,7 +403,7 @@ C = TypeVar("C", bound="Component")
 
 
 def check_arguments(cls: type) -> None:
-    """Make the constructor of a class raise an ArgumentError for wrong arguments.
+    """Make the constructor of a class raise ArgumentError for wrong arguments, in place.
 
     The error lists unknown, missing, surplus and repeated arguments.
 
@@ -348,11 +413,11 @@ def check_arguments(cls: type) -> None:
     own = vars(cls).get("__init__")
     if own is None or hasattr(own, "__wrapped__"):
         return
-    setattr(cls, "__init__", _checking(own))  # noqa: B010
+    setattr(cls, "__init__", _with_checked_arguments(own))  # noqa: B010
 
 
-def _checking(init: Callable[..., None]) -> Callable[..., None]:
-    """Return a wrapper of a constructor that raises ArgumentError for wrong arguments."""
+def _with_checked_arguments(init: Callable[..., None]) -> Callable[..., None]:
+    """Return a constructor that calls `init` and raises ArgumentError for wrong arguments."""
 
     @wraps(init)
     def checked(self: Any, *args: Any, **kwargs: Any) -> None:
@@ -374,7 +439,10 @@ def _checking(init: Callable[..., None]) -> Callable[..., None]:
 def _wrong_arguments(
     init: Callable[..., None], args: Sequence[Any], kwargs: Mapping[str, Any]
 ) -> str:
-    """Return the error text for the arguments of a constructor; empty if they fit its signature."""
+    """Return the fault of the arguments of the constructor `init`, as error text.
+
+    It is empty if `args` and `kwargs` fit its signature.
+    """
     known = list(signature(init).parameters.values())[1:]
     if any(one.kind in (one.VAR_POSITIONAL, one.VAR_KEYWORD) for one in known):
         return ""
@@ -434,29 +502,38 @@ class Component:
         return frozenset(p.name for value in self.expressions() for p in parameters_of(value))
 
     def _normalise(self, *names: str) -> None:
-        """Convert these fields, numbers or texts such as "2*L1", to Expression objects in place."""
+        """Convert the fields `names`, numbers or texts such as "2*L1", to expressions, in place."""
         for name in names:
             value = expression(getattr(self, name), f"{self.name}, {name}")
             object.__setattr__(self, name, value)
 
     def scoped(self: C, prefix: str) -> C:
-        """Return a copy whose name and parameters have the prefix "`prefix`."."""
-        return self._change(lambda value: renamed(value, prefix), f"{prefix}.{self.name}")
+        """Return a copy whose name and parameters have the prefix "`prefix`.".
+
+        Args:
+            prefix: text before the names, without the dot.
+        """
+        return self._with_changed_fields(
+            lambda value: renamed(value, prefix), f"{prefix}.{self.name}"
+        )
 
     def without_defaults(self: C) -> C:
         """Return a copy whose symbolic parameters have no default values."""
-        return self._change(without_defaults, self.name)
+        return self._with_changed_fields(without_defaults, self.name)
 
     def check_values(self: C, values: Mapping[str, float]) -> C:
-        """Return the component with values of its parameters, checked as in the constructor.
+        """Return the component with numbers for its parameters, checked as in the constructor.
+
+        Args:
+            values: value by parameter name; defaults are used for others.
 
         Raises:
             DescriptionError: the constructor raises it for these values.
         """
-        return self._change(lambda value: with_values(value, values), self.name)
+        return self._with_changed_fields(lambda value: with_values(value, values), self.name)
 
-    def _change(self: C, change: Callable[[Expression], Expression], name: str) -> C:
-        """Return a copy with `change` applied to each scalar field, under the name `name`."""
+    def _with_changed_fields(self: C, change: Callable[[Expression], Expression], name: str) -> C:
+        """Return a copy with the name `name` and with `change` applied to each scalar field."""
         fresh: dict[str, Any] = {
             f.name: _map(getattr(self, f.name), change) for f in fields(self) if f.init
         }
@@ -464,7 +541,7 @@ class Component:
 
 
 def _expressions(value: object) -> Iterator[Expression]:
-    """Yield the expressions in a value, its elements or its fields."""
+    """Yield the expressions that a value is or contains, in tuples and dataclasses."""
     if isinstance(value, Expression):
         yield value
     elif isinstance(value, tuple):
@@ -476,7 +553,7 @@ def _expressions(value: object) -> Iterator[Expression]:
 
 
 def _map(value: Any, change: Callable[[Expression], Expression]) -> Any:
-    """Return a value with `change` applied to its expressions, also in tuples and dataclasses."""
+    """Return a value with `change` applied to the expressions in it, in tuples and dataclasses."""
     if isinstance(value, Expression):
         return change(value)
     if isinstance(value, tuple):
@@ -489,7 +566,12 @@ def _map(value: Any, change: Callable[[Expression], Expression]) -> Any:
 
 
 def with_points(component: C, change: Callable[[Point], Point]) -> C:
-    """Return a copy whose attachment points, also in tuples, are replaced by `change(point)`."""
+    """Return a copy of a component with its attachment points replaced.
+
+    Args:
+        component: component with fields that are points or tuples of points.
+        change: callable (point) -> new point.
+    """
 
     def change_points(value: Any) -> Any:
         if isinstance(value, Point):
@@ -516,7 +598,7 @@ def component_name(text: str) -> str:
 
 
 def named_scalars(given: Any) -> list[tuple[str, Any]] | None:
-    """Return a list of (name, scalar) pairs; None if `given` is not a sequence of such pairs."""
+    """Return pairs (name, scalar) as a list; None if `given` is not a sequence of such pairs."""
     if isinstance(given, str) or not isinstance(given, Iterable):
         return None
     pairs = list(given)
@@ -533,9 +615,14 @@ _NAMED_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def unit_axis(name: str, axis: Any) -> tuple[float, float, float]:
-    """Return the unit vector of an axis: "x", "y", "z", "-x", "-y", "-z" or three numbers.
+    """Return the unit vector (3,) of an axis.
 
-    Three numbers need not have unit length. `name` is the component in error messages.
+    Args:
+        name: name of the component in error messages.
+        axis: "x", "y", "z", "-x", "-y", "-z", or three numbers of any length.
+
+    Raises:
+        DescriptionError: the value is no axis, or its length is zero.
     """
     if isinstance(axis, str):
         sign, letter = (-1.0, axis[1:]) if axis.startswith("-") else (1.0, axis)
@@ -561,7 +648,10 @@ def unit_axis(name: str, axis: Any) -> tuple[float, float, float]:
 def in_plane(
     axis: tuple[float, float, float],
 ) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Return unit vectors (u, v) normal to `axis`, with u x v = axis. For the axis z: x and y."""
+    """Return two unit vectors (u, v) normal to the unit vector `axis`, with u x v = axis.
+
+    For the axis z they are x and y.
+    """
     R = align_z(axis)
     u, v = ([float(R[k, column]) for k in range(3)] for column in (0, 1))
     return (u[0], u[1], u[2]), (v[0], v[1], v[2])

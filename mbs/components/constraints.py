@@ -76,6 +76,10 @@ class Rod(Constraint):
 
         It is the elongation to first order. Its effort is the force that pushes the two origins
         apart [N].
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+            symbols: CasADi symbol of each parameter, by name.
         """
         length = to_sx(self.length, symbols)
         return [("force along", (casadi.sumsqr(pose.p) - length**2) / (2 * length))]
@@ -83,7 +87,11 @@ class Rod(Constraint):
 
 @dataclass(frozen=True, slots=True)
 class _AxisConstraint(Constraint):
-    """A constraint with an axis in frame_a: "x", "y", "z", "-x" .. or three numbers."""
+    """Base of constraints with an axis in frame_a.
+
+    Attributes:
+        axis: "x", "y", "z", "-x", "-y", "-z", or three numbers.
+    """
 
     axis: Any = "z"
 
@@ -100,6 +108,10 @@ class PointOnLine(_AxisConstraint):
         """Return two rows: position of the origin of frame_b across the line [m].
 
         The rows are "force x" and "force y" in axes whose z is `axis`.
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+            symbols: CasADi symbol of each parameter, by name.
         """
         return position_rows(along_z(pose, self.axis), "xy")
 
@@ -115,6 +127,10 @@ class PointOnPlane(_AxisConstraint):
         """Return the row "force z": height of the origin of frame_b above the plane [m].
 
         z is `axis`, the normal of the plane.
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+            symbols: CasADi symbol of each parameter, by name.
         """
         return position_rows(along_z(pose, self.axis), "z")
 
@@ -130,15 +146,24 @@ class ConstantVelocity(_AxisConstraint):
         """Return four rows: coincident origins, and no rotation component about the axis.
 
         frame_b is then rotated relative to frame_a about a line normal to `axis` only.
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+            symbols: CasADi symbol of each parameter, by name.
         """
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "xyz"), orientation_rows(pose)[2]]
 
     def facing(self, pose: Pose) -> list[SX]:
-        """Return (trace(R) - axis' R axis) / 2, which is positive at intended configurations.
+        """Return a number that is positive if the shafts are not folded back onto each other.
+
+        It is (trace(R) - axis' R axis) / 2.
 
         R is the orientation of frame_b in frame_a. Negative values also satisfy the rows, but with
         the shafts folded back onto each other.
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
         """
         return [0.5 * (casadi.trace(pose.R) - cosine(pose, self.axis))]
 
@@ -216,5 +241,10 @@ class RollingDisc(Constraint):
         return RimContact(pose.p[2] - radius * s, point, s)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return the row "force normal": height of the lowest rim point above the plane [m]."""
+        """Return the row "force normal": height of the lowest rim point above the plane [m].
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+            symbols: CasADi symbol of each parameter, by name.
+        """
         return [("force normal", self.contact(self.on_plane(pose), symbols).height)]

@@ -18,7 +18,7 @@ from casadi import SX, Function
 
 from mbs.components import custom
 from mbs.components.bodies import three
-from mbs.components.custom import Approach, Load, RelativeMotion
+from mbs.components.custom import Approach, At, Load, RelativeMotion
 from mbs.components.forces import ForceElement
 from mbs.components.shapes import Shape
 from mbs.errors import DescriptionError
@@ -56,7 +56,7 @@ inside, the nearest face gives the normal."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spot:
-    """Contact point, or nearest points, of two shapes, in the ground frame.
+    """Contact point of two shapes, or midpoint of their nearest points, in the ground frame.
 
     Attributes:
         depth: penetration depth [m], negative for a gap.
@@ -172,7 +172,11 @@ class Contact(ForceElement):
         self._settle_restitution()
 
     def _settle_restitution(self) -> None:
-        """Raise unless restitution and impact_speed are in range, both given, without damping."""
+        """Convert restitution and impact_speed to floats in place.
+
+        Raise DescriptionError if invalid. They must be given together, without damping, and be in
+        range.
+        """
         given = [
             name for name in ("restitution", "impact_speed") if getattr(self, name) is not None
         ]
@@ -197,10 +201,7 @@ class Contact(ForceElement):
 
     @property
     def damping_factor(self) -> Expression:
-        """Damping c [s/m]: `damping`, or the value that results in `restitution`.
-
-        0 without both.
-        """
+        """Damping c [s/m]: `damping`, or the value that results in `restitution`; else 0."""
         if self.restitution is not None and self.impact_speed is not None:
             return Number(damping_for(self.restitution, self.impact_speed))
         return expression(0.0 if self.damping is None else self.damping)
@@ -216,14 +217,14 @@ class Contact(ForceElement):
         return self.names_of("state") if self.has_bristles else ()
 
     def has(self, *methods: str) -> bool:
-        """Return whether the class overrides one of these methods of Custom.
+        """Return whether the class overrides one of the methods of `Custom` with these names.
 
-        "dissipation" does not count with bristles.
+        "dissipation" does not count if friction has bristles.
         """
         asked = [name for name in methods if not (name == "dissipation" and self.has_bristles)]
         return custom.Custom.has(self, *asked)
 
-    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+    def spots(self, motion: RelativeMotion, at: At) -> list[Spot]:
         """Return the contact point of each entry of `labels`, also without contact (depth < 0).
 
         Args:
@@ -234,12 +235,15 @@ class Contact(ForceElement):
 
     # Equations.
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the wrenches ON the body and ON the ground, by frame name of `ports`.
 
         Each is in axes of its own frame, about its own origin [N, N m]. The ground gets the
         reaction, with the same lines of action through the contact points. All forces are zero
         without contact.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         body, ground = (getattr(at, port) for port in self.ports)
         motion = self._motion(at)
@@ -251,19 +255,25 @@ class Contact(ForceElement):
             on_ground -= cross(motion.p + touch.spot.lever, own)
         return custom.between(ground, body, custom.FrameLoad(-force, on_ground), on_body)
 
-    def energy(self, at: Any) -> SX:
+    def energy(self, at: At) -> SX:
         """Return the elastic energy [J], zero without contact.
 
         It is the sum of k d^(n + 1) / (n + 1) over the contact points with d > 0.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         k, n = (to_sx(getattr(self, name), at.symbols) for name in ("stiffness", "exponent"))
         spots = self.spots(self._motion(at), at)
         return sum((k * _power(spot.depth, n + 1) / (n + 1) for spot in spots), SX(0))
 
-    def dissipation(self, at: Any) -> SX:
+    def dissipation(self, at: At) -> SX:
         """Return the power dissipated by normal damping and regularised friction [W].
 
         It is zero without contact, and undefined for friction with bristles (see `has`).
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return sum(
             (
@@ -273,10 +283,13 @@ class Contact(ForceElement):
             SX(0),
         )
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
+    def rates(self, at: At) -> Mapping[str, SX]:
         """Return the rate [m/s] of each bristle state bristle_AXIS + label.
 
         Empty without bristles.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         if not self.has_bristles:
             return {}
@@ -286,11 +299,14 @@ class Contact(ForceElement):
             for axis in self.axes
         }
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return four outputs of each contact point, whose names end with its label.
 
         normal_force and friction_force are magnitudes [N], zero without contact. depth [m] is
         negative for a gap. slip is the tangential speed [m/s], also without contact.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         found: dict[str, SX] = {}
         for label, touch in zip(self.labels, self._touches(at), strict=True):
@@ -303,11 +319,14 @@ class Contact(ForceElement):
             found |= {name + label: value for name, value in zip(_OUTPUTS, values, strict=True)}
         return found
 
-    def crossings(self, at: Any) -> Mapping[str, SX | Approach]:
+    def crossings(self, at: At) -> Mapping[str, SX | Approach]:
         """Return an event indicator "depth" + label of each contact point: its depth [m].
 
         Contact begins and ends at its zero. An offset of 1e-9 m counts touching shapes as in
         contact.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         motion = self._motion(at)
         return {
@@ -315,7 +334,7 @@ class Contact(ForceElement):
             for label, spot in zip(self.labels, self.spots(motion, at), strict=True)
         }
 
-    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+    def approach(self, motion: RelativeMotion, spot: Spot, at: At) -> tuple[SX | None, SX]:
         """Return speed [m/s] and pace [1/s] of the depth of a contact point, see `custom.Approach`.
 
         The speed bounds the speed of all points of the body. The obstacle size is the distance of
@@ -332,20 +351,24 @@ class Contact(ForceElement):
 
     # Helpers.
 
-    def _motion(self, at: Any) -> RelativeMotion:
+    def _motion(self, at: At) -> RelativeMotion:
         """Return the motion of the body's frame in the ground's frame, in axes of the ground."""
         body, ground = (getattr(at, port) for port in self.ports)
         found: RelativeMotion = ground.to(body)
         return found
 
-    def _touches(self, at: Any) -> list[_Touch]:
-        """Return the forces and velocities at each contact point, in the order of `labels`."""
+    def _touches(self, at: At) -> list[_Touch]:
+        """Return forces and velocities at each contact point, in the order of `labels`."""
         motion = self._motion(at)
         spots = self.spots(motion, at)
         return [self._touch(at, motion, *pair) for pair in zip(self.labels, spots, strict=True)]
 
-    def _touch(self, at: Any, motion: RelativeMotion, label: str, spot: Spot) -> _Touch:
-        """Return the forces and velocities at one contact point, in axes of the ground."""
+    def _touch(self, at: At, motion: RelativeMotion, label: str, spot: Spot) -> _Touch:
+        """Return forces and velocities at the contact point `spot`, in axes of the ground.
+
+        `motion` is the motion of the body's frame in the ground's frame, and `label` the suffix of
+        the point.
+        """
         k, n, c, mu = (
             to_sx(value, at.symbols)
             for value in (self.stiffness, self.exponent, self.damping_factor, self.friction)
@@ -366,13 +389,13 @@ class Contact(ForceElement):
             friction, bend = -limit * slip / casadi.sqrt(casadi.dot(slip, slip) + width**2), zeros()
         return _Touch(normal, elastic, along, rate, slip, friction, bend, spot)
 
-    def _bristles(self, at: Any, label: str, spot: Spot, slip: SX, limit: SX) -> tuple[SX, SX]:
-        """Return (3, 1) friction on the body, and (3, 1) rates of the bristles.
+    def _bristles(self, at: At, label: str, spot: Spot, slip: SX, limit: SX) -> tuple[SX, SX]:
+        """Return the friction on the body (3, 1) [N], and the rates of the bristles (3, 1) [m/s].
 
-        With w the deflection as a fraction of its limit, w' = (v - s(w) |v| w) / bristle. s grows
-        from
-        0 at |w| = 1/2 to 1 at |w| = 1, so that |w| stays below 1. The force is
-        -limit (w + bristle_time w'), clamped to the limit.
+        With w the deflection as a fraction of its limit, w' = (v - s(w) abs(v) w) / bristle. s
+        grows from 0 at abs(w) = 1/2 to 1 at abs(w) = 1, so that abs(w) stays below 1. The force is
+        -limit (w + bristle_time w'), clamped to the limit. `slip` (3, 1) is v, `limit` is mu N, and
+        `label` is the suffix of the contact point `spot`.
         """
         longest, time = (to_sx(x, at.symbols) for x in (self.bristle, self.bristle_time))
         bend = vector(
@@ -406,13 +429,15 @@ def damping_for(restitution: float, impact_speed: float) -> float:
     # the function is positive below the root and negative above, and the root is within the bounds
     low, high = 0.75 * (1 - e**2) / (1 + e**3), 1 / e
     while low < (middle := 0.5 * (low + high)) < high:
-        value = _bend(middle) - _bend(-e * middle) if e * middle < 1 else -math.inf
+        value = (
+            _log_remainder(middle) - _log_remainder(-e * middle) if e * middle < 1 else -math.inf
+        )
         low, high = (middle, high) if value > 0 else (low, middle)
     return 0.0 if e == 1 else low / impact_speed
 
 
-def _bend(x: float) -> float:
-    """Return x - ln(1 + x), accurate to rounding for small x."""
+def _log_remainder(x: float) -> float:
+    """Return x - ln(1 + x), accurate to rounding errors for small x."""
     if abs(x) > 0.1:  # x - log loses at most two digits; the series needs 18 terms
         return x - math.log1p(x)
     return sum((-x) ** k / k for k in range(2, 20))  # 0.1^20 is below rounding
@@ -443,7 +468,7 @@ class PlaneContact(Contact):
     body = custom.frame()
     plane = custom.frame()
 
-    def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
+    def centres(self, motion: RelativeMotion, at: At) -> list[SX]:
         """Return the (3, 1) centres of the spheres, in the frame of the body [m].
 
         Args:
@@ -452,22 +477,36 @@ class PlaneContact(Contact):
         """
         return [zeros()]
 
-    def reach(self, at: Any) -> SX:
-        """Return the radius of the spheres [m]; zero for points."""
+    def reach(self, at: At) -> SX:
+        """Return the radius of the spheres [m]; zero for points.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(0)
 
-    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+    def approach(self, motion: RelativeMotion, spot: Spot, at: At) -> tuple[SX | None, SX]:
         """Return a bound of the speed of the body [m/s], and its angular speed as the pace [1/s].
 
         A plane has no size: a depth can fall and rise again only if the body rotates. See
         `Contact.approach`.
+
+        Args:
+            motion: motion of the body's frame relative to the ground's frame.
+            spot: contact point, one of those of `spots`.
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         reach = custom.regular_length(spot.lever)
         turn = custom.regular_length(motion.w)
         return custom.regular_length(motion.V) + reach * turn, turn
 
-    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
-        """Return the lowest point of each sphere, with the vertical normal z of the plane."""
+    def spots(self, motion: RelativeMotion, at: At) -> list[Spot]:
+        """Return the lowest point of each sphere, with the vertical normal z of the plane.
+
+        Args:
+            motion: motion of the body's frame relative to the ground's frame.
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         found, up = [], vector([SX(0), SX(0), SX(1)])
         for centre in self.centres(motion, at):
             arm = casadi.mtimes(motion.R, centre)
@@ -489,12 +528,20 @@ class SpherePlaneContact(PlaneContact):
 
     radius = custom.parameter("m", 0.0, min=0)
 
-    def reach(self, at: Any) -> SX:
-        """Return the radius of the sphere [m]."""
+    def reach(self, at: At) -> SX:
+        """Return the radius of the sphere [m].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(at.radius)
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return {"body": sphere to draw}; empty if the radius is zero."""
+        """Return {"body": sphere to draw}; empty if the radius is zero.
+
+        Args:
+            at: values of the parameters as floats, by attribute.
+        """
         return _ball("body", at.radius)
 
 
@@ -513,16 +560,29 @@ class CapsulePlaneContact(PlaneContact):
     radius = custom.parameter("m", positive=True)
     length = custom.parameter("m", positive=True)
 
-    def reach(self, at: Any) -> SX:
-        """Return the radius of the end spheres [m]."""
+    def reach(self, at: At) -> SX:
+        """Return the radius of the end spheres [m].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(at.radius)
 
-    def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
-        """Return the centres (3, 1) [m] of the end spheres a (z < 0) and b (z > 0), in `body`."""
+    def centres(self, motion: RelativeMotion, at: At) -> list[SX]:
+        """Return the centres (3, 1) [m] of the end spheres a (z < 0) and b (z > 0), in `body`.
+
+        Args:
+            motion: motion of the body's frame relative to the ground's frame.
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return [vector([SX(0), SX(0), side * at.length / 2]) for side in (-1, 1)]
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return {"body": capsule to draw}."""
+        """Return {"body": capsule to draw}.
+
+        Args:
+            at: values of the parameters as floats, by attribute.
+        """
         return {"body": Shape("capsule", (at.radius, at.length))}
 
 
@@ -543,21 +603,33 @@ class WheelPlaneContact(PlaneContact):
     radius = custom.parameter("m", positive=True)
     rim = custom.parameter("m", 0.0, min=0)
 
-    def reach(self, at: Any) -> SX:
-        """Return the radius of the rounding of the rim [m]."""
+    def reach(self, at: At) -> SX:
+        """Return the radius of the rounding of the rim [m].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(at.rim)
 
-    def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
+    def centres(self, motion: RelativeMotion, at: At) -> list[SX]:
         """Return the lowest point (3, 1) of the centre circle of the rim in the frame `body` [m].
 
         It moves along the circle while the wheel rotates.
+
+        Args:
+            motion: motion of the body's frame relative to the ground's frame.
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         up = motion.R[2, :].T
         across = vector([up[0], SX(0), up[2]])
         return [-at.radius * across / custom.regular_length(across)]
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return {"body": ellipsoid to draw}, as wide as the rim."""
+        """Return {"body": ellipsoid to draw}, as wide as the rim.
+
+        Args:
+            at: values of the parameters as floats, by attribute.
+        """
         outer = at.radius + at.rim
         return {"body": Shape("ellipsoid", (outer, max(at.rim, _THIN * outer), outer))}
 
@@ -579,22 +651,30 @@ class BoxPlaneContact(PlaneContact):
         _take_size(self)
         Contact.__post_init__(self)
 
-    def centres(self, motion: RelativeMotion, at: Any) -> list[SX]:
+    def centres(self, motion: RelativeMotion, at: At) -> list[SX]:
         """Return the corners 1 to 8, (3, 1) each, in the frame `body` [m].
 
         Corner 1 has negative x, y and z. From corner to corner x changes sign first, then y, then
         z.
+
+        Args:
+            motion: motion of the body's frame relative to the ground's frame.
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         half = _half_size(self, at)
         return [half * vector(map(SX, signs[::-1])) for signs in product((-1, 1), repeat=3)]
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return {"body": box to draw}; empty if a side has no value."""
+        """Return {"body": box to draw}; empty if a side has no value.
+
+        Args:
+            at: values of the parameters as floats, by attribute.
+        """
         return _cuboid("body", self.size, at)
 
 
 def _take_size(box: Any) -> None:
-    """Convert the sides `size` of a box to expressions. Raise if a side is not positive."""
+    """Replace the field `size` of a box by three expressions; raise DescriptionError if invalid."""
     sides = three(box.size, f"{box.name}, size")
     for side in sides:
         value = to_float(side)
@@ -606,24 +686,27 @@ def _take_size(box: Any) -> None:
 
 
 def _ball(port: str, radius: float) -> Mapping[str, Shape]:
-    """Return {port: sphere to draw}; empty if the radius is zero."""
+    """Return {port: sphere of this radius [m] to draw}; empty if the radius is zero."""
     return {port: Shape("sphere", (radius,))} if radius > 0 else {}
 
 
 def _cuboid(port: str, size: Any, at: Any) -> Mapping[str, Shape]:
-    """Return {port: box to draw}; empty if one of the sides has no value."""
+    """Return {port: box to draw} with the sides `size`; empty if one of them has no value.
+
+    `at` has the values of parameters.
+    """
     sides = [to_float(side, at.symbols) for side in size]
     known = tuple(side for side in sides if side is not None)
     return {port: Shape("box", known)} if len(known) == len(sides) else {}
 
 
-def _within(value: SX, half: SX) -> SX:
-    """Return `value` limited to the range from -half to half."""
+def _clamped(value: SX, half: SX) -> SX:
+    """Return `value` (1, 1) limited to the range from -half to half."""
     return casadi.fmin(casadi.fmax(value, -half), half)
 
 
-def _half_size(box: Any, at: Any) -> SX:
-    """Return half the sides of a box along x, y, z, (3, 1) [m]."""
+def _half_size(box: Any, at: At) -> SX:
+    """Return half the sides of a box along x, y, z, (3, 1) [m], at the parameters in `at`."""
     return vector(to_sx(side, at.symbols) for side in box.size) / 2
 
 
@@ -645,22 +728,36 @@ class SphereSphereContact(Contact):
     radius_a = custom.parameter("m", positive=True)
     radius_b = custom.parameter("m", positive=True)
 
-    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+    def spots(self, motion: RelativeMotion, at: At) -> list[Spot]:
         """Return the contact point on the line of centres, midway between both surfaces.
 
         The depth is radius_a + radius_b less the distance of the centres. The normal points from a
         to b.
+
+        Args:
+            motion: motion of the body's frame relative to the ground's frame.
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         depth = at.radius_a + at.radius_b - motion.length
         return [Spot(depth, motion.along, -(at.radius_b - depth / 2) * motion.along)]
 
-    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
-        """Return the relative speed of the centres [m/s], and it over the sum of radii [1/s]."""
+    def approach(self, motion: RelativeMotion, spot: Spot, at: At) -> tuple[SX | None, SX]:
+        """Return the relative speed of the centres [m/s], and it over the sum of radii [1/s].
+
+        Args:
+            motion: motion of the body's frame relative to the ground's frame.
+            spot: contact point, one of those of `spots`.
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         speed = custom.regular_length(at.b.v - at.a.v)
         return speed, speed / (at.radius_a + at.radius_b)
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return {"a": sphere, "b": sphere} to draw."""
+        """Return {"a": sphere, "b": sphere} to draw.
+
+        Args:
+            at: values of the parameters as floats, by attribute.
+        """
         return {**_ball("a", at.radius_a), **_ball("b", at.radius_b)}
 
 
@@ -683,29 +780,39 @@ class SphereCapsuleContact(Contact):
     capsule_radius = custom.parameter("m", positive=True)
     length = custom.parameter("m", positive=True)
 
-    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+    def spots(self, motion: RelativeMotion, at: At) -> list[Spot]:
         """Return the contact point, midway between both surfaces.
 
         The normal points from the nearest point of the capsule axis to the centre of the sphere.
+
+        Args:
+            motion: motion of the body's frame relative to the ground's frame.
+            at: values of the component and motion of its ports, see `custom.At`.
         """
-        along = _within(motion.p[2], at.length / 2)
+        along = _clamped(motion.p[2], at.length / 2)
         off = motion.p - vector([SX(0), SX(0), along])
         distance = custom.regular_length(off)
         depth = at.radius + at.capsule_radius - distance
         return [Spot(depth, off / distance, -(at.radius - depth / 2) * off / distance)]
 
-    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+    def approach(self, motion: RelativeMotion, spot: Spot, at: At) -> tuple[SX | None, SX]:
         """Return the speed of the sphere centre in the capsule frame [m/s], and a pace [1/s].
 
         The pace is this speed divided by the sum of the radii.
+
+        Args:
+            motion: motion of the body's frame relative to the ground's frame.
+            spot: contact point, one of those of `spots`.
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         speed = custom.regular_length(motion.V)
         return speed, speed / (at.radius + at.capsule_radius)
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return {"sphere": sphere, "capsule".
+        """Return {"sphere": sphere, "capsule": capsule} to draw, without a sphere of radius 0.
 
-        Capsule} to draw, without a sphere of radius zero.
+        Args:
+            at: values of the parameters as floats, by attribute.
         """
         capsule = Shape("capsule", (at.capsule_radius, at.length))
         return {**_ball("sphere", at.radius), "capsule": capsule}
@@ -736,19 +843,23 @@ class CapsuleCapsuleContact(Contact):
     radius_b = custom.parameter("m", positive=True)
     length_b = custom.parameter("m", positive=True)
 
-    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+    def spots(self, motion: RelativeMotion, at: At) -> list[Spot]:
         """Return the contact point, midway between both surfaces at the nearest points of the axes.
 
         The normal points from the nearest point of axis a to that of axis b.
+
+        Args:
+            motion: motion of the body's frame relative to the ground's frame.
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         axis = motion.R[:, 2]
         cosine, weight = axis[2], 1 + _PARALLEL
         own, other = motion.p[2], casadi.dot(motion.p, axis)
         half_a, half_b = at.length_a / 2, at.length_b / 2
         # minimum of a convex function of s and t within the lengths
-        s = _within((weight * own - cosine * other) / (weight**2 - cosine**2), half_a)
-        t = _within((cosine * s - other) / weight, half_b)
-        s = _within((own + cosine * t) / weight, half_a)
+        s = _clamped((weight * own - cosine * other) / (weight**2 - cosine**2), half_a)
+        t = _clamped((cosine * s - other) / weight, half_b)
+        s = _clamped((own + cosine * t) / weight, half_a)
         off = motion.p + t * axis - vector([SX(0), SX(0), s])
         length = custom.regular_length(off)
         distance = casadi.sqrt(length**2 + _PARALLEL * (s**2 + t**2))
@@ -756,17 +867,26 @@ class CapsuleCapsuleContact(Contact):
         lever = t * axis - (at.radius_b - depth / 2) * normal
         return [Spot(depth, normal, lever, length / distance)]
 
-    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+    def approach(self, motion: RelativeMotion, spot: Spot, at: At) -> tuple[SX | None, SX]:
         """Return a bound of the speed of the axis points of b in frame a [m/s], and a pace [1/s].
 
         The pace is this speed divided by the sum of the radii.
+
+        Args:
+            motion: motion of the body's frame relative to the ground's frame.
+            spot: contact point, one of those of `spots`.
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         turn = at.length_b / 2 * custom.regular_length(motion.w)
         speed = custom.regular_length(motion.V) + turn
         return speed, speed / (at.radius_a + at.radius_b)
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return {"a": capsule, "b": capsule} to draw."""
+        """Return {"a": capsule, "b": capsule} to draw.
+
+        Args:
+            at: values of the parameters as floats, by attribute.
+        """
         return {
             "a": Shape("capsule", (at.radius_a, at.length_a)),
             "b": Shape("capsule", (at.radius_b, at.length_b)),
@@ -796,11 +916,15 @@ class SphereBoxContact(Contact):
         _take_size(self)
         Contact.__post_init__(self)
 
-    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+    def spots(self, motion: RelativeMotion, at: At) -> list[Spot]:
         """Return the contact point, midway between box and sphere surface at the nearest point.
 
         The normal points from the box to the centre of the sphere. If the centre is inside the box,
         it is the normal of the nearest face.
+
+        Args:
+            motion: motion of the body's frame relative to the ground's frame.
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         beyond = casadi.fabs(motion.p) - _half_size(self, at)
         outside = casadi.fmax(beyond, 0)
@@ -816,10 +940,15 @@ class SphereBoxContact(Contact):
         depth = at.radius - casadi.if_else(is_outside, distance, nearest)
         return [Spot(depth, normal, -(at.radius - depth / 2) * normal)]
 
-    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+    def approach(self, motion: RelativeMotion, spot: Spot, at: At) -> tuple[SX | None, SX]:
         """Return the speed of the sphere centre in the box frame [m/s], and a pace [1/s].
 
         The pace is this speed divided by the radius plus half the shortest side.
+
+        Args:
+            motion: motion of the body's frame relative to the ground's frame.
+            spot: contact point, one of those of `spots`.
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         speed = custom.regular_length(motion.V)
         return speed, speed / (at.radius + casadi.mmin(_half_size(self, at)))
@@ -828,6 +957,9 @@ class SphereBoxContact(Contact):
         """Return {"sphere": sphere, "box": box} to draw.
 
         A sphere of radius zero is left out, and so is a box with a side that has no value.
+
+        Args:
+            at: values of the parameters as floats, by attribute.
         """
         return {**_ball("sphere", at.radius), **_cuboid("box", self.size, at)}
 
@@ -889,10 +1021,15 @@ class HeightFieldContact(Contact):
                 " numbers"
             )
 
-    def approach(self, motion: RelativeMotion, spot: Spot, at: Any) -> tuple[SX | None, SX]:
+    def approach(self, motion: RelativeMotion, spot: Spot, at: At) -> tuple[SX | None, SX]:
         """Return None, since bumps leave the speed of the depth unbounded, and the pace [1/s].
 
         The pace is the speed of the centre in the frame `ground` divided by `spacing`.
+
+        Args:
+            motion: motion of the body's frame relative to the ground's frame.
+            spot: contact point, one of those of `spots`.
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         size = casadi.if_else(at.radius > 0, at.radius, _SPACING)
         if self.spacing is not None:
@@ -900,13 +1037,21 @@ class HeightFieldContact(Contact):
         return None, custom.regular_length(motion.V) / size
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return {"body": sphere to draw}, empty for a point. The ground is not drawn."""
+        """Return {"body": sphere to draw}, empty for a point. The ground is not drawn.
+
+        Args:
+            at: values of the parameters as floats, by attribute.
+        """
         return _ball("body", at.radius)
 
-    def spots(self, motion: RelativeMotion, at: Any) -> list[Spot]:
+    def spots(self, motion: RelativeMotion, at: At) -> list[Spot]:
         """Return the contact point on the line through the centre along the gradient of the depth.
 
         The normal is the negative unit gradient. The slope is the length of the gradient.
+
+        Args:
+            motion: motion of the body's frame relative to the ground's frame.
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         c = SX.sym("c", 3)
         h = SX(self.height(c[0], c[1]))

@@ -58,9 +58,9 @@ class Coupling(Component):
         return (self.driven, self.driver, *(name for name, _ in self.others))
 
     def _checked_others(self) -> tuple[tuple[str, Expression], ...]:
-        """Return pairs (coordinate name, factor as expression).
+        """Return `others` as pairs (coordinate name, factor).
 
-        Raise if `others` has another form.
+        Raise DescriptionError for other forms.
         """
         pairs = named_scalars(self.others)
         if pairs is None:
@@ -71,7 +71,11 @@ class Coupling(Component):
         return tuple((n, expression(c, f"{self.name}, factor of {n}")) for n, c in pairs)
 
     def scoped(self, prefix: str) -> Coupling:
-        """Return a copy whose name, coordinates and parameters have the prefix "`prefix`."."""
+        """Return a copy whose name, coordinates and parameters have the prefix "`prefix`.".
+
+        Args:
+            prefix: text before the names, without the dot.
+        """
         inner = Component.scoped(self, prefix)
         return replace(
             inner,
@@ -99,9 +103,10 @@ class Transmission(Coupling):
     offset: Scalar = field(kw_only=True, default=0.0)
 
     def _set_factor(self, given: str, factor: Expression) -> None:
-        """Set the coefficients to (offset, factor).
+        """Set the coefficients to (offset, factor), in place.
 
-        Raise with the field name `given` if factor is 0.
+        Raise DescriptionError if the factor is 0. `given` is the name of the field that the factor
+        is computed from.
         """
         if to_float(factor) == 0:
             raise DescriptionError(
@@ -188,6 +193,6 @@ class Helical(Cylindrical):
 
     @property
     def companions(self) -> tuple[Component, ...]:
-        """The `Screw` NAME.thread that ties the coordinates NAME.s and NAME.phi."""
+        """The `Screw` NAME.thread that couples the coordinates NAME.s and NAME.phi."""
         name = self.name
         return (Screw(f"{name}.thread", f"{name}.s", f"{name}.phi", pitch=self.pitch),)

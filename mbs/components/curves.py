@@ -17,7 +17,7 @@ from casadi import SX
 from numpy.typing import NDArray
 
 from mbs.components import custom
-from mbs.components.custom import Custom, Row
+from mbs.components.custom import At, Custom, Row
 from mbs.errors import DescriptionError
 from mbs.text import quoted
 
@@ -46,7 +46,11 @@ class Spline:
     period: float | None
 
     def at(self, t: SX) -> SX:
-        """Return the point (d, 1) of the curve at the parameter t, (1, 1)."""
+        """Return the point (d, 1) of the curve.
+
+        Args:
+            t: (1, 1) parameter of the curve.
+        """
         t, _ = self._within(t)
         steps = [t >= knot for knot in self.knots[1:]]
         u = t - _chosen(self.knots, steps)
@@ -54,10 +58,15 @@ class Spline:
         return casadi.vertcat(*(self._element(k, u, steps) for k in range(dimension)))
 
     def bend(self, t: SX) -> SX:
-        """Return an event indicator that is zero at the knots, where the third derivative jumps.
+        """Return an event indicator (1, 1) that is zero at the knots.
+
+        The third derivative of the curve is discontinuous there.
 
         It is a parabola between two knots, alternately positive and negative, with slopes of 1 or
         -1 at the knots.
+
+        Args:
+            t: (1, 1) parameter of the curve.
         """
         t, turns = self._within(t)
         knots = np.unique(self.knots)
@@ -71,14 +80,20 @@ class Spline:
         return SX(sign * (t - before) * (after - t) / (after - before))
 
     def _within(self, t: SX) -> tuple[SX, SX]:
-        """Return t reduced to the first period, and the number of removed periods (or 0)."""
+        """Return t reduced to the first period, and the number of removed periods.
+
+        Without a period they are t and 0.
+        """
         if self.period is None:
             return t, SX(0)
         turns = casadi.floor((t - self.knots[0]) / self.period)
         return SX(t - self.period * turns), SX(turns)
 
     def _element(self, k: int, u: SX, steps: Sequence[SX]) -> SX:
-        """Return element k of the active piece at the distance u from its knot."""
+        """Return element k of the active piece at the distance u from its knot.
+
+        `steps` is whether t is at or above each knot but the first.
+        """
         value = SX(0)
         for power in (3, 2, 1, 0):
             value = value * u + _chosen(self.coefficients[power, :, k], steps)
@@ -86,7 +101,11 @@ class Spline:
 
 
 def _chosen(values: Array, steps: Sequence[SX]) -> SX:
-    """Return the entry of `values` whose index is the number of true `steps`: the active piece."""
+    """Return the entry of `values` whose index is the number of true `steps`.
+
+    The steps, expressions of 0 or 1, count the knots that are passed: the entry of the active
+    piece.
+    """
     found = SX(float(values[0]))
     for step, jump in zip(steps, np.diff(values), strict=True):
         found += step * float(jump)
@@ -94,9 +113,13 @@ def _chosen(values: Array, steps: Sequence[SX]) -> SX:
 
 
 def natural_spline(t: Array, points: Array) -> Spline:
-    """Return the spline through points (n, d) at t (n,), straight beyond its ends.
+    """Return the spline through points, straight beyond its ends.
 
     Its second derivatives are zero at both ends.
+
+    Args:
+        t: (n,) increasing parameters of the points.
+        points: (n, d) points.
     """
     h: Array = np.diff(t)
     slopes: Array = np.diff(points, axis=0) / h[:, None]
@@ -118,7 +141,13 @@ def natural_spline(t: Array, points: Array) -> Spline:
 
 
 def periodic_spline(t: Array, points: Array, period: float) -> Spline:
-    """Return the spline of period `period` through points (n, d) at t (n,), within one period."""
+    """Return the periodic spline through points.
+
+    Args:
+        t: (n,) increasing parameters of the points, within one period.
+        points: (n, d) points.
+        period: period of the parameter.
+    """
     n = len(t)
     h: Array = np.diff(np.append(t, t[0] + period))
     slopes = np.diff(np.concatenate([points, points[:1]]), axis=0) / h[:, None]
@@ -135,9 +164,10 @@ def periodic_spline(t: Array, points: Array, period: float) -> Spline:
 
 
 def _pieces(points: Array, slopes: Array, h: Array, M: Array) -> Array:
-    """Return (4, m, d) coefficients of the powers 0 .. 3 of each piece.
+    """Return the coefficients (4, m, d) of the powers 0 .. 3 of each piece.
 
-    `slopes` (m, d) of chords, lengths `h` (m,) of pieces, second derivatives `M` at knots.
+    `points` (m or m + 1, d) are the points, `slopes` (m, d) those of the chords, `h` (m,) the
+    lengths of the pieces in the parameter, and `M` (m + 1, d) the second derivatives at the knots.
     """
     h = h[:, None]
     first = slopes - h * (2 * M[:-1] + M[1:]) / 6
@@ -151,11 +181,11 @@ points with different rounding, through which a spline would have an arbitrary d
 Rows = tuple[tuple[float, ...], ...]
 
 
-def _rows_of(name: str, what: str, given: Any, columns: int, least: int, example: str) -> Rows:
-    """Return a table of numbers as tuples; raise DescriptionError if it is invalid.
+def _table_rows(name: str, what: str, given: Any, columns: int, least: int, example: str) -> Rows:
+    """Return a table of numbers as rows; raise DescriptionError if it is invalid.
 
-    The table needs `columns` numbers per row and `least` rows. `what` and `example` are for
-    messages.
+    The table `given` needs `columns` numbers per row and at least `least` rows. `name`, `what` and
+    `example` are for messages.
     """
     try:
         values: NDArray[np.float64] = np.array(given, dtype=float)
@@ -204,7 +234,7 @@ class PointOnCurve(Custom):
     def __post_init__(self) -> None:
         Custom.__post_init__(self)
         least = 3 if self.closed else 2
-        rows = _rows_of(self.name, "curve", self.curve, 3, least, "[(0, 0, 0), (1, 0.2, 0)]")
+        rows = _table_rows(self.name, "curve", self.curve, 3, least, "[(0, 0, 0), (1, 0.2, 0)]")
         object.__setattr__(self, "curve", rows)
         distances = self._distances()
         near = [k for k, d in enumerate(distances) if d <= _APART * max(distances)]
@@ -214,22 +244,32 @@ class PointOnCurve(Custom):
                 " once, and the first one of a closed curve not again at its end"
             )
 
-    def rows(self, at: Any) -> Mapping[str, Row | SX]:
+    def rows(self, at: At) -> Mapping[str, Row | SX]:
         """Return rows "x", "y", "z": position of the pin minus the curve point c(s) [m].
 
         Both are vectors in axes of `ground`.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         off = at.ground.to(at.pin).p - self.spline.at(at.s)
         return dict(zip("xyz", casadi.vertsplit(off), strict=True))
 
-    def crossings(self, at: Any) -> Mapping[str, SX]:
-        """Return {"knots": event indicator}, which changes sign at each knot of the spline."""
+    def crossings(self, at: At) -> Mapping[str, SX]:
+        """Return {"knots": event indicator}, which changes sign at each knot of the spline.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"knots": self.spline.bend(at.s)}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return force_x, force_y, force_z: constraint force ON the pin, in axes of ground [N].
 
         The body of `ground` gets the reaction, which is not part of the outputs.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {f"force_{axis}": at.lam[axis] for axis in "xyz"}
 
@@ -281,7 +321,9 @@ class Cam(Custom):
     def __post_init__(self) -> None:
         Custom.__post_init__(self)
         least = 2 if self.period is None else 3
-        rows = _rows_of(self.name, "profile", self.profile, 2, least, "[(0, 0), (2, 0.01), (4, 0)]")
+        rows = _table_rows(
+            self.name, "profile", self.profile, 2, least, "[(0, 0), (2, 0.01), (4, 0)]"
+        )
         object.__setattr__(self, "profile", rows)
         period = self.period
         if period is not None and not (isinstance(period, (int, float)) and 0 < period < math.inf):
@@ -303,19 +345,30 @@ class Cam(Custom):
                 f" {period:g}; leave the row out that repeats the first one"
             )
 
-    def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return {"lift": driven minus lift(driver) [m or rad]}."""
+    def rows(self, at: At) -> Mapping[str, Row | SX]:
+        """Return {"lift": driven minus lift(driver) [m or rad]}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         lift = self.spline.at(at.driver.q)
         return {"lift": Row(at.driven.q - lift, "m" if at.driven.unit == "m" else "1")}
 
-    def crossings(self, at: Any) -> Mapping[str, SX]:
-        """Return {"knots": event indicator}, which changes sign at each knot of the lift."""
+    def crossings(self, at: At) -> Mapping[str, SX]:
+        """Return {"knots": event indicator}, which changes sign at each knot of the lift.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"knots": self.spline.bend(at.driver.q)}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"effort": constraint effort ON the driven coordinate [N or N m]}.
 
         It is negative if a follower that is only pressed on would leave the cam.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {"effort": at.lam["lift"]}
 

@@ -69,7 +69,8 @@ class Declared:
     Attributes:
         kind: frame, flange, coordinate, parameter, state, mode, unknown, input or output.
         unit: unit of the value.
-        default: default of a parameter or an input, start of a state or guess of an unknown.
+        default: default of a parameter or an input, initial value of a state or guess of an
+            unknown.
         low, high: least and greatest value of a parameter.
         nominal: typical size of a state.
     """
@@ -186,7 +187,11 @@ def input(unit: str = "1", *, default: float = 0.0) -> Any:
 
 
 def output(unit: str = "1") -> Any:
-    """Declare an output signal, returned by `outputs`: for results, FMUs and wires."""
+    """Declare an output signal, whose value the method `outputs` returns: for results, FMUs, wires.
+
+    Args:
+        unit: unit of the value; `EFFORT` for N or N m, depending on the coordinate.
+    """
     return Declared("output", unit)
 
 
@@ -232,7 +237,10 @@ class Flange:
 
 
 class _Handle:
-    """Class attribute of a flange, an input or an output: `motor.voltage` returns a Signal."""
+    """Class attribute of a flange, an input or an output.
+
+    On a component, such as `motor.voltage`, it returns a `Flange` or a `Signal`.
+    """
 
     def __init__(self, kind: str, name: str) -> None:
         self.kind, self.name = kind, name
@@ -261,7 +269,7 @@ SHORTEST = 1e-12
 
 
 def regular_length(x: SX) -> SX:
-    """Return sqrt(x'x + 1e-24), the length of a column x, which is differentiable at x = 0."""
+    """Return the length (1, 1) sqrt(x'x + 1e-24) of a column x, differentiable at x = 0."""
     return casadi.sqrt(casadi.dot(x, x) + SHORTEST**2)
 
 
@@ -314,6 +322,7 @@ class FrameAt:
 
     @cached_property
     def _in_world(self) -> RelativeMotion:
+        """Motion of the frame relative to the world, in axes of the world."""
         return self._seen_from(None)
 
     @property
@@ -337,13 +346,17 @@ class FrameAt:
         return self._in_world.w
 
     def to(self, other: FrameAt) -> RelativeMotion:
-        """Return position, rotation and velocities of `other` in this frame, in its axes."""
+        """Return the motion of another frame relative to this frame, in axes of this frame.
+
+        Args:
+            other: second frame of the component.
+        """
         return other._seen_from(self)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoordinateAt:
-    """Position and rate of a coordinate, or of a weighted sum of coordinates.
+    """Position and rate of a joint coordinate, or of a weighted sum of coordinates.
 
     Attributes:
         q: position [rad or m]. None for rates without a position, as of a spherical joint.
@@ -375,12 +388,12 @@ class FlangeAt:
 
 
 class At:
-    """Values of a component in the current state: each declared name is an attribute.
+    """Argument of the methods of a component: values in the current state, as attributes.
 
-    Frames are `FrameAt`, flanges `FlangeAt`, coordinates `CoordinateAt`. Parameters, states, inputs
-    and unknowns are (1, 1) expressions. In `outputs`, `lam` has the constraint effort of each row
-    by label. A positive effort acts towards an increase of the value of the row. `symbols` has the
-    symbol of each parameter of the mechanism by name.
+    Each declared name is an attribute. Frames are `FrameAt`, flanges `FlangeAt`, coordinates
+    `CoordinateAt`. Parameters, states, inputs and unknowns are (1, 1) expressions. In `outputs`,
+    `lam` has the constraint effort of each row by label. A positive effort acts towards an increase
+    of the value of the row. `symbols` has the symbol of each parameter of the mechanism by name.
     """
 
     def __init__(
@@ -441,7 +454,7 @@ def torque(value: Any, *, own_axes: bool = False) -> FrameLoad:
 
 
 def _column(value: Any) -> SX:
-    """Return a column (k, 1): an expression, or a list of numbers and expressions."""
+    """Return a column (k, 1), given as an expression or as a list of numbers and expressions."""
     return vector(value) if isinstance(value, (list, tuple)) else SX(value)
 
 
@@ -465,9 +478,14 @@ def between(
 
 
 def pull(a: FrameAt, b: FrameAt, tension: SX) -> dict[str, FrameLoad]:
-    """Return the forces that a tension [N] exerts ON a and b, by port: each towards the other.
+    """Return the forces that a tension exerts ON two points, each towards the other, by port.
 
-    Each force acts at the origin of its frame and is in its own axes. A negative tension pushes.
+    Each force acts at the origin of its frame and is in its own axes.
+
+    Args:
+        a: frame of the component.
+        b: second frame of the component.
+        tension: (1, 1) tension [N]; a negative tension pushes the points apart.
     """
     return between(a, b, FrameLoad(a.to(b).along * tension, zeros()))
 
@@ -659,7 +677,7 @@ class Custom(OnPoints):
                 _CHECKS[what.kind](self, name, what)
 
     def require_made(self) -> None:
-        """Raise DescriptionError if `__post_init__` of the class skipped Custom.__post_init__."""
+        """Raise DescriptionError if the class skipped the `__post_init__` of Custom."""
         for name in self.names_of("frame", "parameter"):
             given = getattr(self, name)
             if given is not None and not isinstance(given, (Point, Expression)):
@@ -671,11 +689,18 @@ class Custom(OnPoints):
     # Ports.
 
     def names_of(self, *kinds: str) -> tuple[str, ...]:
-        """Return the names of the declarations of these kinds, such as "state", in class order."""
+        """Return the names of the declarations of some kinds, in the order of the class.
+
+        Args:
+            kinds: kinds of declarations, such as "state" or "parameter", see `Declared`.
+        """
         return tuple(name for name, what in self.declared.items() if what.kind in kinds)
 
     def drawn(self, values: Mapping[str, float]) -> Mapping[str, Shape]:
-        """Return the shapes by port at values of the symbols; none if a parameter has no value.
+        """Return the shapes that pictures show, by frame port; empty if a parameter has no value.
+
+        Args:
+            values: value of each symbol, by name.
 
         Raises:
             DescriptionError: an entry of `figures` is no Shape, or its port is no frame.
@@ -709,7 +734,7 @@ class Custom(OnPoints):
 
     @property
     def coordinates(self) -> Mapping[str, tuple[tuple[str, Scalar], ...]]:
-        """Pairs (coordinate name, factor) by port: the port is the sum of factor times coordinate.
+        """Pairs (coordinate name, factor) by port: a port is the sum of factor times coordinate.
 
         A declared coordinate has the single pair (name, 1).
         """
@@ -726,7 +751,10 @@ class Custom(OnPoints):
         return tuple(getattr(self, name) for name in self.names_of("flange"))
 
     def slides(self, flange: Flange) -> bool | None:
-        """Return whether a flange has a position in m. None if it may also be an angle in rad."""
+        """Return whether the position of a flange is in m (True) or rad (False).
+
+        None if both are allowed.
+        """
         declared = {port_of_flange(name): name for name in self.names_of("flange")}
         unit = self.declared[declared[flange.port]].unit
         return None if unit == "1" else unit == "m"
@@ -749,7 +777,7 @@ class Custom(OnPoints):
 
     @property
     def scope(self) -> str:
-        """End of the sentence that reports the component: which models contain it.
+        """End of the message that reports the component: the models that contain it.
 
         Empty if all models contain it.
         """
@@ -760,7 +788,11 @@ class Custom(OnPoints):
         return ", in simulations; the other models leave it out"
 
     def scoped(self: C, prefix: str) -> C:
-        """Return a copy whose name, parameters, points and coordinates start with "`prefix`."."""
+        """Return a copy whose name, parameters, points and coordinates start with "`prefix`.".
+
+        Args:
+            prefix: text before the names, without the dot.
+        """
         inner = OnPoints.scoped(self, prefix)
         changed: dict[str, Any] = {
             name: f"{prefix}.{getattr(self, name)}" for name in self.names_of("coordinate")
@@ -769,89 +801,142 @@ class Custom(OnPoints):
 
     # Equations of the component.
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the loads ON the ports by port: `FrameLoad` on frames, efforts on other ports.
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return the loads that the component exerts ON its ports, by port.
 
-        An effort is in N or N m along the coordinate or flange. Ports without an entry get no load.
+        A load is a `FrameLoad` on a frame, or an effort along a coordinate or flange [N or N m].
+        Ports without an entry get no load.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {}
 
-    def energy(self, at: Any) -> SX:
-        """Return the stored energy (1, 1) [J], zero by default."""
+    def energy(self, at: At) -> SX:
+        """Return the stored energy (1, 1) [J], zero by default.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(0)
 
-    def dissipation(self, at: Any) -> SX:
-        """Return the dissipated power (1, 1) [W], zero by default."""
+    def dissipation(self, at: At) -> SX:
+        """Return the dissipated power (1, 1) [W], zero by default.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(0)
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the time derivative of each state, by state name."""
+    def rates(self, at: At) -> Mapping[str, SX]:
+        """Return the time derivative of each state, by state name.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {}
 
-    def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return position constraints by label.
-
-        Values that must be zero, in m or as a `Row` with unit.
+    def rows(self, at: At) -> Mapping[str, Row | SX]:
+        """Return position constraints by label: values that must be zero, in m or as a `Row`.
 
         They depend on positions, unknowns and parameters.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {}
 
-    def positive(self, at: Any) -> Mapping[str, SX]:
-        """Return expressions by label that are positive at the intended configurations only."""
+    def positive(self, at: At) -> Mapping[str, SX]:
+        """Return expressions by label that are positive at the intended configurations only.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {}
 
-    def velocity_rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return velocity constraints by label: values, linear in velocities, that must be zero."""
+    def velocity_rows(self, at: At) -> Mapping[str, Row | SX]:
+        """Return velocity constraints by label: values, linear in velocities, that must be zero.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the value of each output, by output name."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return the value of each output, by output name.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {}
 
-    def events(self, at: Any) -> Mapping[str, Event]:
-        """Return the events by label, each with a trigger and new values of states or modes.
+    def events(self, at: At) -> Mapping[str, Event]:
+        """Return the events by label, each with an indicator and new values of states or modes.
 
         They depend on positions, velocities, states, modes and inputs.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {}
 
-    def frictions(self, at: Any) -> Mapping[str, Friction]:
-        """Return dry frictions with sticking by label. The label "" is a single friction."""
+    def frictions(self, at: At) -> Mapping[str, Friction]:
+        """Return dry frictions with sticking by label. A single friction may have the label "".
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {}
 
-    def stops(self, at: Any) -> Mapping[str, Stop | OneWay]:
-        """Return rigid stops and freewheels by label. The label "" is a single element."""
+    def stops(self, at: At) -> Mapping[str, Stop | OneWay]:
+        """Return rigid stops and freewheels by label. A single element may have the label "".
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {}
 
-    def limits(self, at: Any) -> Mapping[str, tuple[SX | None, SX | None]]:
-        """Return (lower, upper) of its coordinates by port [rad or m]. None is an open side."""
+    def limits(self, at: At) -> Mapping[str, tuple[SX | None, SX | None]]:
+        """Return limits (lower, upper) of its coordinates, by port [rad or m].
+
+        None for no limit.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {}
 
-    def crossings(self, at: Any) -> Mapping[str, SX | Approach]:
-        """Return event indicators, by label, for kinks of the law and for laws that act briefly.
+    def crossings(self, at: At) -> Mapping[str, SX | Approach]:
+        """Return event indicators by label, which change sign where a law is not smooth.
 
         An indicator depends on positions, velocities, states and parameters. A step of
-        `mbs.simulate.run` ends at its zero. An `Approach` also has a bound of its rate.
+        `mbs.simulate.run` ends at its zero. An `Approach` also has a bound of its rate, for laws
+        that act only briefly.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {}
 
     def figures(self, at: Any) -> Mapping[str, Shape]:
-        """Return shapes that pictures show, by frame port; `at` has parameters as floats.
+        """Return shapes that pictures show, by frame port; empty by default.
 
         The component is not drawn if a parameter has no value.
+
+        Args:
+            at: values of the parameters as floats, by attribute.
         """
         return {}
 
     # Properties that the assembly uses.
 
     def has(self, *methods: str) -> bool:
-        """Return whether the class overrides at least one of these methods of Custom."""
+        """Return whether the class overrides one of the methods of Custom with these names."""
         return any(getattr(type(self), name) is not getattr(Custom, name) for name in methods)
 
     @property
     def has_equations(self) -> bool:
-        """Whether it contributes loads, states, constraints, outputs, frictions or stops to models.
+        """Whether the component contributes loads, states, rows, outputs, frictions or stops.
 
         False if the assembly replaces it by joints and couplings (`lowered`).
         """
@@ -888,7 +973,7 @@ class Custom(OnPoints):
         return self.names_of("output")
 
     def _require_magnitudes(self, *names: str) -> None:
-        """Raise DescriptionError if a number in these fields is below zero."""
+        """Raise DescriptionError if a number in the fields `names` is below zero; symbols pass."""
         for name in names:
             given = getattr(self, name)
             for scalar in given if isinstance(given, tuple) else (given,):
@@ -897,14 +982,17 @@ class Custom(OnPoints):
                     raise DescriptionError(f"{self.name}: {name} is {value:g}; give zero or more")
 
     def _require_positive(self, *names: str) -> None:
-        """Raise DescriptionError if a number in these fields is zero or less."""
+        """Raise DescriptionError if a number in the fields `names` is zero or less.
+
+        Symbols pass.
+        """
         for name in names:
             value = to_float(getattr(self, name))
             if value is not None and value <= 0:
                 raise DescriptionError(f"{self.name}: {name} is {value:g}; give more than zero")
 
     def _require_effect(self, *names: str) -> None:
-        """Raise DescriptionError if all these fields are zero, so that the element does nothing."""
+        """Raise DescriptionError if all the fields `names` are zero, so that it does nothing."""
         values = [getattr(self, name) for name in names]
         flat = [v for value in values for v in (value if isinstance(value, tuple) else (value,))]
         if all(value == Number(0.0) for value in flat):
@@ -925,7 +1013,10 @@ _RESERVED = frozenset({"name", "declared", "symbols", "lam", *vars(Custom)})
 
 
 def _make_fields(cls: type[Custom], own: Mapping[str, Declared]) -> None:
-    """Replace declarations by dataclass fields (constructor arguments) and signal handles."""
+    """Replace declarations `own` of a class by dataclass fields and signal handles, in place.
+
+    Raise DescriptionError for an invalid name, `__slots__`, or a wrong order of defaults.
+    """
     if "__slots__" in vars(cls):
         raise DescriptionError(f"{cls.__name__}: it has __slots__; leave them out")
     annotations: dict[str, Any] = dict(inspect.get_annotations(cls))
@@ -963,13 +1054,20 @@ def _make_fields(cls: type[Custom], own: Mapping[str, Declared]) -> None:
 
 
 def _check_frame(component: Custom, name: str, what: Declared) -> None:
-    """Replace the field `name`, a body or a point, by a point; None stays if it is the default."""
+    """Replace the field `name`, a body or a point, by a point, in place.
+
+    None stays if it is the default of the declaration `what`. Raise DescriptionError for other
+    values.
+    """
     if getattr(component, name) is not None or what.default is REQUIRED:
         component._take_point(name)
 
 
 def _check_coordinate(component: Custom, name: str, what: Declared) -> None:
-    """Replace the field `name`, a joint or a coordinate name, by a coordinate name."""
+    """Replace the field `name`, a joint or a coordinate name, by a coordinate name, in place.
+
+    Raise DescriptionError for other values.
+    """
     given = getattr(component, name)
     if isinstance(given, Component) and not isinstance(given, OnPoints):
         given = given.name
@@ -982,7 +1080,10 @@ def _check_coordinate(component: Custom, name: str, what: Declared) -> None:
 
 
 def _check_parameter(component: Custom, name: str, what: Declared) -> None:
-    """Convert the field `name` to an expression. Raise if its value is out of bounds."""
+    """Convert the field `name` to an expression, in place.
+
+    Raise DescriptionError if it is a number outside the bounds of its declaration `what`.
+    """
     if getattr(component, name) is None and what.default is None:
         return
     component._normalise(name)
@@ -998,7 +1099,10 @@ def _check_parameter(component: Custom, name: str, what: Declared) -> None:
 
 
 def _check_number(component: Custom, name: str, what: Declared) -> None:
-    """Convert the field `name` to a finite float; raise DescriptionError for other values."""
+    """Convert the field `name` to a finite float, in place.
+
+    Raise ExpressionError for other values.
+    """
     object.__setattr__(
         component, name, finite(getattr(component, name), f"{component.name}, {name}")
     )

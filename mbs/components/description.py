@@ -56,7 +56,10 @@ class SubMechanism:
         return self.outer.components[full]
 
     def body(self, name: str) -> RigidBody:
-        """Return the body with the name `name` inside the nested mechanism."""
+        """Return the body `name` of the nested mechanism.
+
+        Raise DescriptionError if it is no body.
+        """
         component = self[name]
         if not isinstance(component, RigidBody):
             raise DescriptionError(
@@ -65,7 +68,10 @@ class SubMechanism:
         return component
 
     def point(self, name: str) -> Point:
-        """Return the named frame `name` of the nested mechanism, as a point."""
+        """Return the named frame `name` of the nested mechanism, as a point.
+
+        Raise DescriptionError if it does not exist.
+        """
         full = f"{self.scope}.{name}"
         if full not in self.outer.frames:
             inside = sorted(n for n in self.outer.frames if n.startswith(f"{self.scope}."))
@@ -84,7 +90,15 @@ _SCOPE = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*", re.ASCII)
 
 
 def place(outer: Description, inner: Description, name: str) -> SubMechanism:
-    """Copy the components of a mechanism into another mechanism, with names prefixed by `name`.
+    """Copy the components of a mechanism into another mechanism, with prefixed names.
+
+    Args:
+        outer: mechanism that gets the components, in place.
+        inner: mechanism to copy.
+        name: prefix of the names: body "b" becomes "name.b".
+
+    Returns:
+        handle to the copied components.
 
     Raises:
         DescriptionError: the name is taken, or is no valid prefix of the names of parameters.
@@ -131,7 +145,10 @@ def place(outer: Description, inner: Description, name: str) -> SubMechanism:
 
 
 def _frames_of(inner: Description) -> dict[str, Point]:
-    """Return the named frames of a mechanism; if its base is mounted, also "outer_world"."""
+    """Return the named frames of a mechanism, with "outer_world" if its base is mounted.
+
+    Raise DescriptionError if a frame has this name already.
+    """
     if not inner.mount.steps:
         return inner.frames
     if OUTER_WORLD in inner.frames:
@@ -143,9 +160,12 @@ def _frames_of(inner: Description) -> dict[str, Point]:
 
 
 def on_placed(point: Point, placed: Mapping[str, Component], scope: str) -> Point:
-    """Return a point of a nested mechanism with its owner replaced by the copy in `placed`.
+    """Return the copy of a point of a nested mechanism.
 
-    Parameters of the placement get the prefix "`scope`.".
+    Args:
+        point: point of the original.
+        placed: copies of the components, by original name; the owner of the point is replaced.
+        scope: prefix of the parameters of its placement.
     """
     owner = placed[point.owner.name]
     return replace(point, owner=owner, placement=point.placement.scoped(scope))
@@ -171,7 +191,7 @@ _COMPENSATIONS = "_gravcomp", "_gravity"
 
 
 class Description:
-    """Components and connections of a mechanism.
+    """Components and connections of a mechanism under construction.
 
     `mbs.Mechanism` adds the assembly. Its docstring describes arguments and attributes.
     """
@@ -331,9 +351,14 @@ class Description:
     ) -> None:
         """Put a joint between two points, weld two points together, or connect two flanges.
 
-        `connect(a, joint, b)` puts the joint's frame_a on a and its frame_b on b;
-        `connect(a, b)` makes the two frames coincide. A frame of a joint is a point as well.
-        Connected flanges rotate together. Joints and parts of drive lines are added automatically.
+        `connect(a, joint, b)` puts the joint's frame_a on a and its frame_b on b; `connect(a, b)`
+        makes the two frames coincide. A frame of a joint is a point as well. Connected flanges
+        rotate together. Joints and parts of drive lines are added automatically.
+
+        Args:
+            a: point, body (its reference frame) or flange.
+            joint_or_point: joint between two points, or second point or flange.
+            b: second point, if a joint is given.
 
         Raises:
             DescriptionError: a component is not in the mechanism, or the joint is connected
@@ -368,7 +393,7 @@ class Description:
             return
         if b is not None:
             raise DescriptionError(
-                f"{self.name}: {_what(joint_or_point)} stands where a joint belongs;"
+                f"{self.name}: {_display_text(joint_or_point)} stands where a joint belongs;"
                 " write connect(point, joint, point)"
             )
         self._weld(self._point(a), self._point(joint_or_point))
@@ -390,7 +415,7 @@ class Description:
         is_output = isinstance(source, Signal) and source.kind == "output"
         if not (isinstance(source, str) or is_output):
             raise DescriptionError(
-                f"{self.name}: a wire comes from {_what(source)},"
+                f"{self.name}: a wire comes from {_display_text(source)},"
                 " which is no output; give an output of a component, or the name of a reading such"
                 " as 'encoder.q'"
             )
@@ -409,7 +434,7 @@ class Description:
             target = inputs[target]
         if not isinstance(target, Signal) or target.kind != "input":
             raise DescriptionError(
-                f"{self.name}: a wire leads to {_what(target)},"
+                f"{self.name}: a wire leads to {_display_text(target)},"
                 " which is no input; give an input of a component, such as motor.voltage"
             )
         for signal in (source, target):
@@ -420,6 +445,10 @@ class Description:
 
     def add_frame(self, name: str, point: Point | RigidBody) -> Point:
         """Give a point, such as a tool centre point, a name that models accept. Return the point.
+
+        Args:
+            name: name of the frame, unique in the mechanism.
+            point: point, or body for its reference frame.
 
         Raises:
             DescriptionError: the name is taken, or the point is on no component of the mechanism.
@@ -437,16 +466,27 @@ class Description:
         Args:
             point: centre of the shape, or the frame of its mesh.
             shape: shape to show.
+
+        Raises:
+            DescriptionError: `shape` is no Shape, or the point is on no component of the mechanism.
         """
         if not isinstance(shape, Shape):
-            raise DescriptionError(f"{self.name}: {_what(shape)} is no shape; give a Shape")
+            raise DescriptionError(f"{self.name}: {_display_text(shape)} is no shape; give a Shape")
         self.shapes.append((self._point(point), shape))
 
     def cut(self, joint: Joint) -> None:
-        """Cut the loop of this joint at the joint, instead of at the joint chosen automatically."""
+        """Cut a loop at this joint, instead of at the joint that is chosen automatically.
+
+        Args:
+            joint: connected joint of a loop.
+
+        Raises:
+            DescriptionError: the argument is no joint, or the joint is not connected.
+        """
         if not isinstance(joint, Joint):
             raise DescriptionError(
-                f"{self.name}: {_what(joint)} is not a joint; give the joint itself, not its name"
+                f"{self.name}: {_display_text(joint)} is not a joint; give the joint itself, not"
+                " its name"
             )
         if self.components.get(joint.name) is not joint:
             raise DescriptionError(
@@ -455,7 +495,7 @@ class Description:
         self.cuts.append(joint.name)
 
     def _require_use(self, component: Component) -> None:
-        """Raise DescriptionError if a component is of no known type or returns no equations."""
+        """Raise DescriptionError if a component has no known type or results in no equation."""
         if isinstance(component, MotionJoint) and component.frame_a is None:
             raise DescriptionError(
                 f"{self.name}: {type(component).__name__} {component.name!r} is added, but a joint"
@@ -501,11 +541,11 @@ class Description:
         return (c for c in self.components.values() if isinstance(c, Coupling))
 
     def parameters(self) -> tuple[Parameter, ...]:
-        """Return the symbols that the components use, with values, in the order of their first use.
+        """Return the symbols that the components use, with values, in order of first use.
 
         Raises:
-            AssemblyError: a value is given for a symbol that no component uses, or a symbol has
-                two different values.
+            AssemblyError: a value is given for a symbol that no component uses, or a symbol has two
+                different values.
         """
         found: dict[str, Parameter] = {}
         for parameter in self.used_parameters():
@@ -547,7 +587,10 @@ class Description:
         return found
 
     def _merge(self, known: Parameter, other: Parameter) -> Parameter:
-        """Return one Parameter for two uses of a symbol. Raise if their values or bounds differ."""
+        """Return one Parameter for two uses of a symbol, `known` and `other`.
+
+        Raise AssemblyError if their values or bounds differ.
+        """
         for what in ("default", "min", "max"):
             one, two = getattr(known, what), getattr(other, what)
             if None not in (one, two) and one != two:
@@ -565,7 +608,7 @@ class Description:
         return replace(first, unit=unit, min=low, max=high)
 
     def used_parameters(self) -> Iterator[Parameter]:
-        """Yield each symbol of components and placements once per use, also repeatedly."""
+        """Yield the symbols of components and placements, repeatedly if used repeatedly."""
         for component in self.components.values():
             for value in component.expressions():
                 yield from parameters_of(value)
@@ -577,12 +620,15 @@ class Description:
                 yield from parameters_of(value)
 
     def _point(self, point: Point | RigidBody) -> Point:
-        """Return a point of the mechanism; raise if its owner was not added."""
+        """Return a point, or the reference frame of a body, of the mechanism.
+
+        Raise DescriptionError for other values, or if its owner was not added.
+        """
         if isinstance(point, RigidBody):
             point = point.frame
         if not isinstance(point, Point):
             raise DescriptionError(
-                f"{self.name}: {_what(point)} is not a point;"
+                f"{self.name}: {_display_text(point)} is not a point;"
                 " give a body, body.at(...) or joint.frame_a"
             )
         if self.components.get(point.owner.name) is not point.owner:
@@ -593,9 +639,12 @@ class Description:
         return point
 
     def _weld(self, a: Point, b: Point) -> None:
-        """Make two frames coincide; raise if a frame of a joint is connected already."""
+        """Make two frames coincide.
+
+        Raise DescriptionError if a joint frame is connected already.
+        """
         for point in (a, b):
-            if isinstance(point.owner, Joint) and self._is_used(point):
+            if isinstance(point.owner, Joint) and self._is_connected(point):
                 raise DescriptionError(
                     f"{self.name}: frame_{point.port} of joint {point.owner.name!r} is connected"
                     " twice; use one joint for each connection"
@@ -603,14 +652,17 @@ class Description:
         self.connections.append((a, b))
 
     def _join(self, flanges: tuple[Flange, Flange]) -> None:
-        """Connect two flanges and add the components that have them."""
+        """Connect two flanges, and add the components that have them."""
         for flange in flanges:
             if self.components.get(flange.owner.name) is not flange.owner:
                 self.add(flange.owner)
         self.shafts.append(flanges)
 
-    def _is_used(self, point: Point) -> bool:
-        """Return whether a frame of a joint is connected, after new connections are registered."""
+    def _is_connected(self, point: Point) -> bool:
+        """Return whether `point`, a frame of a joint, is connected.
+
+        New connections are registered first.
+        """
         if self._counted > len(self.connections):
             self._ports.clear()
             self._counted = 0
@@ -623,8 +675,8 @@ class Description:
 check_arguments(Description)
 
 
-def _what(value: object) -> str:
-    """Return the text of a value in a message: a component or a signal by its name."""
+def _display_text(value: object) -> str:
+    """Return the text of a value for messages: a component or signal by its name, else quoted."""
     if isinstance(value, Component):
         return f"{type(value).__name__} {value.name!r}"
     if isinstance(value, Signal):

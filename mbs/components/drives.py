@@ -13,7 +13,7 @@ from casadi import SX
 
 from mbs.components import custom
 from mbs.components.component import Component
-from mbs.components.custom import Custom, Flange, Load
+from mbs.components.custom import At, Custom, Flange, Load
 from mbs.components.forces import CoordinateForce
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
@@ -37,6 +37,10 @@ class TwoFlanges(Custom):
 
 def flange_pair(where: str, *given: Any) -> tuple[Flange, Flange]:
     """Return the two flanges in the arguments of a connection.
+
+    Args:
+        where: name of the mechanism, for the message.
+        given: arguments; None is ignored.
 
     Raises:
         DescriptionError: an argument is no flange, or there are not exactly two.
@@ -124,14 +128,24 @@ class FixedFlange(OneFlange):
 
 
 def check_inertia(name: str, inertia: Scalar) -> None:
-    """Raise DescriptionError if an inertia is a negative number."""
+    """Raise DescriptionError if an inertia [kg m^2] is a negative number; symbols pass.
+
+    Args:
+        name: name of the component, for the message.
+        inertia: moment of inertia.
+    """
     value = to_float(inertia)
     if value is not None and value < 0:
         raise DescriptionError(f"{name}: inertia is {value:g} kg m^2; give zero or more")
 
 
 def check_ratio(name: str, ratio: Scalar) -> None:
-    """Raise DescriptionError if a gear ratio is zero."""
+    """Raise DescriptionError if a gear ratio is zero; symbols pass.
+
+    Args:
+        name: name of the component, for the message.
+        ratio: gear ratio.
+    """
     if to_float(ratio) == 0:
         raise DescriptionError(
             f"{name}: ratio is 0, which ties nothing; give the revolutions of flange_a per"
@@ -158,12 +172,20 @@ class TorqueSource(Device):
     tau = custom.input("N.m")
     w = custom.output("rad/s")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return {"flange": torque ON the shaft [N m]}, equal to the input `tau`."""
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return {"flange": torque ON the shaft [N m]}, equal to the input `tau`.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"flange": at.tau}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"w": speed of the shaft [rad/s]}."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"w": speed of the shaft [rad/s]}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"w": at.flange.speed}
 
 
@@ -191,6 +213,9 @@ class DCMotor(Device):
 
     def check_values(self, values: Mapping[str, float]) -> Self:
         """Return the motor with numeric values of its parameters, checked as in `__init__`.
+
+        Args:
+            values: value by parameter name.
 
         Raises:
             DescriptionError: a symbolic inductance has the value 0, but the current is a state.
@@ -220,26 +245,40 @@ class DCMotor(Device):
         own = self.names_of("output")
         return own if "i" in self.state_names else ("i", *own)
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"i": di/dt [A/s]}; empty if the inductance is the number 0."""
+    def rates(self, at: At) -> Mapping[str, SX]:
+        """Return {"i": di/dt [A/s]}; empty if the inductance is the number 0.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         left = at.voltage - at.constant * at.flange.speed - at.resistance * at.i
         return {"i": left / at.inductance} if "i" in self.state_names else {}
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return {"flange": torque ON the shaft, constant times current [N m]}."""
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return {"flange": torque ON the shaft, constant times current [N m]}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"flange": at.constant * self._current(at)}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return "tau": torque ON the shaft [N m] and "w": its speed [rad/s].
 
         The current "i" [A] is a third output if it is no state.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         i = self._current(at)
         values = {"tau": at.constant * i, "w": at.flange.speed}
         return values if "i" in self.state_names else {"i": i, **values}
 
-    def _current(self, at: Any) -> SX:
-        """Return the current [A]; without inductance it is (voltage - constant w) / resistance."""
+    def _current(self, at: At) -> SX:
+        """Return the current [A], a state or, without inductance, a function of voltage and speed.
+
+        Without inductance it is (voltage - constant w) / resistance.
+        """
         if "i" in self.state_names:
             return SX(at.i)
         return SX((at.voltage - at.constant * at.flange.speed) / at.resistance)
@@ -288,8 +327,12 @@ class BLDCMotor(Device):
         """Moment of inertia of the rotor [kg m^2], which the assembly adds to the shaft."""
         return expression(self.inertia)
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rates of the currents i_d and i_q [A/s]."""
+    def rates(self, at: At) -> Mapping[str, SX]:
+        """Return the rates of the currents i_d and i_q [A/s].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         L_d, L_q = self._inductances(at)
         w = at.pole_pairs * at.flange.speed
         return {
@@ -297,26 +340,33 @@ class BLDCMotor(Device):
             "i_q": (at.v_q - at.resistance * at.i_q - w * (L_d * at.i_d + at.flux)) / L_q,
         }
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return {"flange": torque ON the shaft [N m]}: the torque of the class docstring."""
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return {"flange": torque ON the shaft [N m]}: the torque of the class docstring.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"flange": self._torque(at)}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return "tau": torque ON the shaft [N m], "w": its speed [rad/s], and "power".
 
         "power" is the electrical input power [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         power = 1.5 * (at.v_d * at.i_d + at.v_q * at.i_q)
         return {"tau": self._torque(at), "w": at.flange.speed, "power": power}
 
-    def _torque(self, at: Any) -> SX:
-        """Return 3/2 P (psi i_q + (L_d - L_q) i_d i_q) [N m]."""
+    def _torque(self, at: At) -> SX:
+        """Return the torque on the shaft, 3/2 P (psi i_q + (L_d - L_q) i_d i_q) [N m]."""
         L_d, L_q = self._inductances(at)
         return SX(1.5 * at.pole_pairs * (at.flux * at.i_q + (L_d - L_q) * at.i_d * at.i_q))
 
     @staticmethod
-    def _inductances(at: Any) -> tuple[SX, SX]:
-        """Return (L_d, L_q) [H]; L_q is L_d by default."""
+    def _inductances(at: At) -> tuple[SX, SX]:
+        """Return (L_d, L_q) [H]; L_q is L_d if it is not given."""
         return at.inductance_d, at.inductance_d if at.inductance_q is None else at.inductance_q
 
 
@@ -350,8 +400,12 @@ class ShaftForce(CoordinateForce):
         """True: the twist x is a sum of angles, not only of speeds."""
         return True
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"torque": `resistance` [N m]}, against which x is moved by the shafts."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"torque": `resistance` [N m]}, against which x is moved by the shafts.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"torque": self.resistance(at)}
 
 
@@ -380,13 +434,21 @@ class ElasticShaft(ShaftForce, TwoFlanges):
         """(flange_a, 1) and (flange_b, -1): the twist x is angle_a - angle_b [rad]."""
         return (self.flange_a, Number(1.0)), (self.flange_b, Number(-1.0))
 
-    def resistance(self, at: Any) -> SX:
-        """Return the torque stiffness x + damping dx/dt [N m] from flange_a to flange_b."""
+    def resistance(self, at: At) -> SX:
+        """Return the torque stiffness x + damping dx/dt [N m] from flange_a to flange_b.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         stiffness, damping = to_sx(self.stiffness, at.symbols), to_sx(self.damping, at.symbols)
         return SX(stiffness * at.x.q + damping * at.x.v)
 
-    def energy(self, at: Any) -> SX:
-        """Return stiffness x^2 / 2 of the twist x [J]."""
+    def energy(self, at: At) -> SX:
+        """Return stiffness x^2 / 2 of the twist x [J].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(0.5 * to_sx(self.stiffness, at.symbols) * at.x.q**2)
 
 
@@ -438,10 +500,18 @@ class ShaftDamper(ShaftForce, OneFlange):
         """(flange, 1): x is the angle of the flange [rad]."""
         return ((self.flange, Number(1.0)),)
 
-    def resistance(self, at: Any) -> SX:
-        """Return damping times shaft speed [N m]. The shaft gets the negative of this torque."""
+    def resistance(self, at: At) -> SX:
+        """Return damping times shaft speed [N m]. The shaft gets the negative of this torque.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(to_sx(self.damping, at.symbols) * at.x.v)
 
-    def dissipation(self, at: Any) -> SX:
-        """Return the friction torque times the speed of the shaft [W]."""
+    def dissipation(self, at: At) -> SX:
+        """Return the friction torque times the speed of the shaft [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(self.resistance(at) * at.x.v)

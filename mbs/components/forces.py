@@ -16,7 +16,7 @@ from casadi import SX
 from mbs.components import custom
 from mbs.components.bodies import three
 from mbs.components.component import Component, Point, SymbolTable, named_scalars
-from mbs.components.custom import Custom, Friction, Load, OneWay, RelativeMotion, Stop
+from mbs.components.custom import At, Custom, Friction, Load, OneWay, RelativeMotion, Stop
 from mbs.components.joints import smooth_sign
 from mbs.components.on_points import OnPair
 from mbs.errors import DescriptionError
@@ -48,13 +48,16 @@ class PairForce(OnPair, ForceElement):
 
 @dataclass(frozen=True, slots=True)
 class CoordinateForce(ForceElement):
-    """A force element on x, a weighted sum of joint coordinates; the weights are moment arms."""
+    """Base of force elements on x, a weighted sum of joint coordinates.
+
+    The weights are moment arms: 1, or m/rad for the length of a tendon over a revolute joint.
+    """
 
     @property
     def levers(self) -> tuple[tuple[str, Scalar], ...]:
         """Pairs (coordinate name, moment arm [m/rad or 1]).
 
-        X is the sum of arm times coordinate.
+        x is the sum of arm times coordinate.
         """
         raise NotImplementedError
 
@@ -63,17 +66,24 @@ class CoordinateForce(ForceElement):
         """Map from the single port "x" to the pairs (coordinate name, moment arm) of `levers`."""
         return {"x": self.levers}
 
-    def resistance(self, at: Any) -> SX:
-        """Return the effort (1, 1) against which x must be moved. The element exerts its negative.
+    def resistance(self, at: At) -> SX:
+        """Return the effort (1, 1) against which x must be moved [N m or N].
 
-        Unit N m if x is an angle, N if x is a length. `at.x` has the value q and the rate v of x.
+        The element exerts the negative of this effort. The unit is N m if x is an angle, N if it is
+        a length. `at.x` has the value q and the rate v of x.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         raise NotImplementedError
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return {"x": -resistance}: effort of the element along x [N m or N].
 
         The assembly applies this effort times its moment arm to each joint coordinate.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {"x": -self.resistance(at)}
 
@@ -101,8 +111,12 @@ class JointForce(CoordinateForce):
         """The single pair (`joint`, 1): x is this joint coordinate."""
         return ((self.joint, Number(1.0)),)
 
-    def limits(self, at: Any) -> Mapping[str, tuple[SX | None, SX | None]]:
-        """Return {"x": (lower, upper)} [rad or m]. None is an open side; {} without both fields."""
+    def limits(self, at: At) -> Mapping[str, tuple[SX | None, SX | None]]:
+        """Return {"x": (lower, upper)} [rad or m]. None is an open side; {} without both fields.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         lower, upper = (getattr(self, side, None) for side in ("lower", "upper"))
         if lower is None and upper is None:
             return {}
@@ -110,7 +124,10 @@ class JointForce(CoordinateForce):
         return {"x": (next(both), next(both))}
 
     def _take_limits(self) -> None:
-        """Convert lower and upper to expressions. Raise if both are None or not in order."""
+        """Convert the fields lower and upper to expressions, in place; None stays.
+
+        Raise DescriptionError if both are None or not in order.
+        """
         sides = [name for name in ("lower", "upper") if getattr(self, name) is not None]
         if not sides:
             raise DescriptionError(
@@ -124,14 +141,15 @@ class JointForce(CoordinateForce):
             )
 
     def scoped(self: J, prefix: str) -> J:
-        """Return a copy whose name, parameters and joint have the prefix "`prefix`."."""
+        """Return a copy whose name, parameters and joint have the prefix "`prefix`.".
+
+        Args:
+            prefix: text before the names, without the dot.
+        """
         return replace(Component.scoped(self, prefix), joint=f"{prefix}.{self.joint}")
 
 
 # Constant forces and torques on a body.
-
-
-_AXES = ("world", "body")
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,20 +170,18 @@ class PointSource(ForceElement):
     @property
     def follows(self) -> bool:
         """Whether the vector is constant in the axes of the point and rotates with the body."""
-        raise NotImplementedError
+        return getattr(self, "axes", "world") == "body"
 
-    def _settle(self, name: str) -> None:
-        """Convert `point` to a Point and the field `name` to three expressions, with checks."""
+    def _take_vector(self, name: str) -> None:
+        """Convert `point` to a Point and the field `name` to three expressions, in place.
+
+        Raise DescriptionError if a value is invalid, all components are zero, or `axes` is unknown.
+        """
         Component.__post_init__(self)
         self._take_point("point")
         object.__setattr__(self, name, three(getattr(self, name), f"{self.name}, {name}"))
         self._require_effect(name)
-        axes = getattr(self, "axes", None)
-        if axes not in _AXES:
-            raise DescriptionError(
-                f"{self.name}: axes is {quoted(axes)}; use 'world', or 'body' for those of the"
-                " point, which rotate with it"
-            )
+        self._require_axes()
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,17 +198,15 @@ class Force(PointSource):
     axes: str = "world"
 
     def __post_init__(self) -> None:
-        self._settle("force")
+        self._take_vector("force")
 
-    @property
-    def follows(self) -> bool:
-        """Whether `axes` is "body": the force rotates with the body."""
-        return self.axes == "body"
-
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return {"point": force ON the body at the origin of the point, in axes of the point} [N].
 
         There is no moment about the origin of the point, and no reaction on another body.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {"point": custom.force(_in_point_axes(self.force, self.follows, at), own_axes=True)}
 
@@ -211,22 +225,21 @@ class Torque(PointSource):
     axes: str = "world"
 
     def __post_init__(self) -> None:
-        self._settle("torque")
+        self._take_vector("torque")
 
-    @property
-    def follows(self) -> bool:
-        """Whether `axes` is "body": the torque rotates with the body."""
-        return self.axes == "body"
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return {"point": torque ON the body, in axes of the point} [N m], without a reaction.
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return {"point": torque ON the body, in axes of the point} [N m], without a reaction."""
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {
             "point": custom.torque(_in_point_axes(self.torque, self.follows, at), own_axes=True)
         }
 
 
-def _in_point_axes(components: tuple[Expression, ...], follows: bool, at: Any) -> SX:
-    """Return a constant vector (3, 1) in axes of the point.
+def _in_point_axes(components: tuple[Expression, ...], follows: bool, at: At) -> SX:
+    """Return a constant vector (3, 1) in axes of the point `at.point`.
 
     The given components are in axes of the point if `follows`, else in axes of the world.
     """
@@ -250,33 +263,50 @@ class LineForce(PairForce):
     force = custom.output("N")
 
     def tension(self, length: SX, rate: SX, symbols: SymbolTable) -> SX:
-        """Return the tension (1, 1) [N] at the distance `length` [m] of a and b and its rate [m/s].
+        """Return the tension (1, 1) [N]; a negative tension pushes the points apart.
 
-        Positive values pull the points together, negative values push them apart.
+        Args:
+            length: (1, 1) distance of the points a and b [m].
+            rate: (1, 1) rate of the distance [m/s].
+            symbols: CasADi symbol of each parameter, by name.
         """
         raise NotImplementedError
 
     def potential(self, length: SX, symbols: SymbolTable) -> SX:
-        """Return the stored energy (1, 1) [J]; its derivative by `length` is the rest tension."""
+        """Return the stored energy (1, 1) [J], whose derivative by `length` is the tension at rest.
+
+        Args:
+            length: (1, 1) distance of the points a and b [m].
+            symbols: CasADi symbol of each parameter, by name.
+        """
         raise NotImplementedError
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the forces ON the points "a" and "b".
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return the forces ON the points "a" and "b": the tension [N], towards the other point.
 
-        Each the tension [N] towards the other point.
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return custom.pull(at.a, at.b, self._tension(at))
 
-    def energy(self, at: Any) -> SX:
-        """Return `potential` [J] at the present distance of a and b."""
+    def energy(self, at: At) -> SX:
+        """Return `potential` [J] at the present distance of a and b.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return self.potential(at.a.to(at.b).length, at.symbols)
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"force": tension [N]}, positive if the points are pulled together."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"force": tension [N]}, positive if the points are pulled together.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"force": self._tension(at)}
 
-    def _tension(self, at: Any) -> SX:
-        """Return `tension` at the present distance of a and b [N]."""
+    def _tension(self, at: At) -> SX:
+        """Return the tension [N] at the present distance of a and b and its rate."""
         motion = at.a.to(at.b)
         return self.tension(motion.length, motion.rate, at.symbols)
 
@@ -307,12 +337,22 @@ class Spring(LineForce):
         """Return stiffness (length - free length) + damping rate [N].
 
         Negative if the spring pushes.
+
+        Args:
+            length: (1, 1) distance of the points a and b [m].
+            rate: (1, 1) rate of the distance [m/s].
+            symbols: CasADi symbol of each parameter, by name.
         """
         stretch = length - to_sx(self.length, symbols)
         return to_sx(self.stiffness, symbols) * stretch + to_sx(self.damping, symbols) * rate
 
     def potential(self, length: SX, symbols: SymbolTable) -> SX:
-        """Return stiffness (length - free length)^2 / 2 [J]."""
+        """Return stiffness (length - free length)^2 / 2 [J].
+
+        Args:
+            length: (1, 1) distance of the points a and b [m].
+            symbols: CasADi symbol of each parameter, by name.
+        """
         stretch = length - to_sx(self.length, symbols)
         return 0.5 * to_sx(self.stiffness, symbols) * stretch**2
 
@@ -334,11 +374,22 @@ class Damper(LineForce):
         self._require_effect("damping")
 
     def tension(self, length: SX, rate: SX, symbols: SymbolTable) -> SX:
-        """Return damping times the rate of the distance [N]. Positive: the points move apart."""
+        """Return damping times the rate of the distance [N]. Positive: the points move apart.
+
+        Args:
+            length: (1, 1) distance of the points a and b [m].
+            rate: (1, 1) rate of the distance [m/s].
+            symbols: CasADi symbol of each parameter, by name.
+        """
         return to_sx(self.damping, symbols) * rate
 
     def potential(self, length: SX, symbols: SymbolTable) -> SX:
-        """Return zero: a damper stores no energy."""
+        """Return zero: a damper stores no energy.
+
+        Args:
+            length: (1, 1) distance of the points a and b [m].
+            symbols: CasADi symbol of each parameter, by name.
+        """
         return SX(0)
 
 
@@ -360,11 +411,22 @@ class PointGravity(LineForce):
         self._require_effect("strength")
 
     def tension(self, length: SX, rate: SX, symbols: SymbolTable) -> SX:
-        """Return mu / length^2 [N], positive if the points attract each other."""
+        """Return mu / length^2 [N], positive if the points attract each other.
+
+        Args:
+            length: (1, 1) distance of the points a and b [m].
+            rate: (1, 1) rate of the distance [m/s].
+            symbols: CasADi symbol of each parameter, by name.
+        """
         return to_sx(self.strength, symbols) / length**2
 
     def potential(self, length: SX, symbols: SymbolTable) -> SX:
-        """Return the potential energy -mu / length [J], which is zero at infinite distance."""
+        """Return the potential energy -mu / length [J], which is zero at infinite distance.
+
+        Args:
+            length: (1, 1) distance of the points a and b [m].
+            symbols: CasADi symbol of each parameter, by name.
+        """
         return -to_sx(self.strength, symbols) / length
 
 
@@ -396,39 +458,61 @@ class SpringDamperSeries(ForceElement):
     force = custom.output("N")
     parallel = custom.parameter("N/m", 0.0, min=0)
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"elongation": dz/dt [m/s]}, the damper force divided by `damping`."""
+    def rates(self, at: At) -> Mapping[str, SX]:
+        """Return {"elongation": dz/dt [m/s]}, the damper force divided by `damping`.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"elongation": self._damper_force(at) / at.damping}
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the forces ON a and ON b, by "a" and "b": T [N] towards the other point."""
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return the forces ON the points "a" and "b": tension T [N], towards the other point.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return custom.pull(at.a, at.b, self._tension(at))
 
-    def energy(self, at: Any) -> SX:
+    def energy(self, at: At) -> SX:
         """Return the energy of both springs [J].
 
         It is stiffness (L - length - z)^2 / 2 + parallel z^2 / 2.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         stored = at.stiffness * self._stretch(at) ** 2 + at.parallel * at.elongation**2
         return SX(0.5 * stored)
 
-    def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by the damper, damper force^2 / damping [W]."""
+    def dissipation(self, at: At) -> SX:
+        """Return the power dissipated by the damper, damper force^2 / damping [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(self._damper_force(at) ** 2 / at.damping)
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"force": tension T [N]}, positive if it pulls the points together."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"force": tension T [N]}, positive if it pulls the points together.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"force": self._tension(at)}
 
-    def _stretch(self, at: Any) -> SX:
-        """Return the elongation L - length - z of the series spring [m]. Negative: compressed."""
+    def _stretch(self, at: At) -> SX:
+        """Return the elongation L - length - z of the series spring [m], negative if compressed."""
         return SX(at.a.to(at.b).length - at.length - at.elongation)
 
-    def _tension(self, at: Any) -> SX:
-        """Return the tension T of the series spring [N]."""
+    def _tension(self, at: At) -> SX:
+        """Return the tension T of the series spring [N].
+
+        Positive values pull the points together.
+        """
         return SX(at.stiffness * self._stretch(at))
 
-    def _damper_force(self, at: Any) -> SX:
+    def _damper_force(self, at: At) -> SX:
         """Return the damper force T - parallel z [N] from the balance at the massless node."""
         return SX(self._tension(at) - at.parallel * at.elongation)
 
@@ -467,25 +551,40 @@ class SpringFrictionSeries(ForceElement):
     force = custom.output("N")
     slip = custom.output("m")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the forces ON a and ON b, by "a" and "b": T [N] towards the other point."""
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return the forces ON the points "a" and "b": tension T [N], towards the other point.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return custom.pull(at.a, at.b, self._tension(at))
 
-    def energy(self, at: Any) -> SX:
-        """Return the energy of both springs, T^2 / (2 stiffness) + parallel z^2 / 2 [J]."""
+    def energy(self, at: At) -> SX:
+        """Return the energy of both springs, T^2 / (2 stiffness) + parallel z^2 / 2 [J].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         z = self._elongation(at)
         return SX(0.5 * (self._tension(at) ** 2 / at.stiffness + at.parallel * z**2))
 
-    def dissipation(self, at: Any) -> SX:
-        """Return the friction power during sliding [W]; zero while the friction sticks."""
+    def dissipation(self, at: At) -> SX:
+        """Return the friction power during sliding [W]; zero while the friction sticks.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         share = at.stiffness / (at.stiffness + at.parallel)
         return SX(at.friction * share * at.direction * at.a.to(at.b).rate)
 
-    def events(self, at: Any) -> Mapping[str, custom.Event]:
+    def events(self, at: At) -> Mapping[str, custom.Event]:
         """Return the events "longer" and "shorter" (sliding begins in a direction) and "sticks".
 
         Sliding begins if |T - parallel z| reaches `friction`, and ends if the rate of L changes
         sign.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         sticks, rate = at.direction == 0, at.a.to(at.b).rate
         force = self._tension(at) - at.parallel * at.elongation
@@ -501,21 +600,31 @@ class SpringFrictionSeries(ForceElement):
         stop = {"elongation": self._elongation(at), "direction": SX(0)}
         return {**found, "sticks": custom.Event(turned, stop)}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return "force": tension T [N], positive if it pulls, and "slip": elongation z [m]."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return "force": tension T [N], positive if it pulls, and "slip": elongation z [m].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"force": self._tension(at), "slip": self._elongation(at)}
 
-    def _sliding(self, at: Any, direction: SX | int) -> SX:
-        """Return the z [m] at which T - parallel z is `direction` (1 or -1) times `friction`."""
+    def _sliding(self, at: At, direction: SX | int) -> SX:
+        """Return the elongation z [m] at which the friction slides.
+
+        There T - parallel z is `direction` (1 or -1) times the friction force.
+        """
         pull = at.stiffness * (at.a.to(at.b).length - at.length) - direction * at.friction
         return SX(pull / (at.stiffness + at.parallel))
 
-    def _elongation(self, at: Any) -> SX:
-        """Return z [m]: the stored value while the friction sticks, else the value of sliding."""
+    def _elongation(self, at: At) -> SX:
+        """Return the elongation z of the friction [m].
+
+        It is the stored value while the friction sticks, else that of sliding.
+        """
         return SX(casadi.if_else(at.direction == 0, at.elongation, self._sliding(at, at.direction)))
 
-    def _tension(self, at: Any) -> SX:
-        """Return T = stiffness (L - length - z) [N]."""
+    def _tension(self, at: At) -> SX:
+        """Return the tension T = stiffness (L - length - z) [N], positive if it pulls."""
         return SX(at.stiffness * (at.a.to(at.b).length - at.length - self._elongation(at)))
 
 
@@ -570,41 +679,53 @@ class Bushing(PairForce):
         self._require_magnitudes(*_STRENGTHS)
         self._require_effect(*_STRENGTHS)
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the wrenches ON a and ON b, by "a" and "b", in axes of and about the own frame.
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return the wrenches ON the frames "a" and "b", each about its origin and in its axes.
 
         The force pulls the origins together. The force on b acts at its origin, so that the
         reaction on a has an additional moment about the origin of a.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
-        motion, force, moment = self._at_b(at)
+        motion, force, moment = self._load_at_b(at)
         on_a = custom.FrameLoad(force, moment + cross(motion.p, force))
         return custom.between(at.a, at.b, on_a, -moment)
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return the wrench ON the body of a about the origin of b, in axes of a.
 
         Names: force_x, force_y, force_z [N]; moment_x, moment_y, moment_z [N m].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
-        _, force, moment = self._at_b(at)
+        _, force, moment = self._load_at_b(at)
         values = (*casadi.vertsplit(force), *casadi.vertsplit(moment))
         return dict(zip(self.output_names, values, strict=True))
 
-    def _at_b(self, at: Any) -> tuple[RelativeMotion, SX, SX]:
-        """Return the motion of b in a, and force and moment (3, 1) ON a about the origin of b.
+    def _load_at_b(self, at: At) -> tuple[RelativeMotion, SX, SX]:
+        """Return the motion of b in a, and force [N] and moment [N m] ON a about the origin of b.
 
-        All are in axes of a [N, N m].
+        All are in axes of a, (3, 1).
         """
         motion, symbols = at.a.to(at.b), at.symbols
         half, cosine = _half_turn(motion.R)
         w = motion.w
         rate = cosine * w + cross(w, half)
-        force = self._sum("stiffness", motion.p, "damping", motion.V, symbols)
-        torque = self._sum("angular_stiffness", 2 * half, "angular_damping", rate, symbols)
+        force = self._elementwise_sum("stiffness", motion.p, "damping", motion.V, symbols)
+        torque = self._elementwise_sum(
+            "angular_stiffness", 2 * half, "angular_damping", rate, symbols
+        )
         moment = cosine * torque + cross(half, torque)
         return motion, force, moment
 
-    def energy(self, at: Any) -> SX:
-        """Return the energy p' K p / 2 + phi' K_phi phi / 2 [J], zero if the frames coincide."""
+    def energy(self, at: At) -> SX:
+        """Return the energy p' K p / 2 + phi' K_phi phi / 2 [J], zero if the frames coincide.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         motion = at.a.to(at.b)
         half, _ = _half_turn(motion.R)
         total = SX(0)
@@ -612,12 +733,12 @@ class Bushing(PairForce):
             total += 0.5 * casadi.dot(x, self._vector(name, at.symbols) * x)
         return total
 
-    def _sum(self, one: str, x: SX, other: str, rate: SX, symbols: SymbolTable) -> SX:
-        """Return field `one` times x plus field `other` times rate: (3, 1), elementwise."""
+    def _elementwise_sum(self, one: str, x: SX, other: str, rate: SX, symbols: SymbolTable) -> SX:
+        """Return the sum (3, 1) of the fields `one` times x and `other` times rate, elementwise."""
         return self._vector(one, symbols) * x + self._vector(other, symbols) * rate
 
     def _vector(self, name: str, symbols: SymbolTable) -> SX:
-        """Return the three values of the field `name` as a column (3, 1)."""
+        """Return the three values of the field `name` as a column (3, 1), in CasADi `symbols`."""
         return vector(to_sx(value, symbols) for value in getattr(self, name))
 
 
@@ -669,40 +790,52 @@ class JointStop(JointForce):
         """True: the depth beyond a limit depends on the position, not only on the rate."""
         return True
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"effort": effort ON the joint [N m or N]}: negative at the upper limit.
 
         It is positive at the lower limit and zero between the limits.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {"effort": -self.resistance(at)}
 
-    def resistance(self, at: Any) -> SX:
+    def resistance(self, at: At) -> SX:
         """Return the effort against which the joint is moved: positive beyond the upper limit.
 
         It is negative beyond the lower limit and zero between the limits. Its size is stiffness
         times the ramp of the depth (see `smooth_ramp`) plus the damping effort, limited to that of
         the spring.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         stiffness, damping = to_sx(self.stiffness, at.symbols), to_sx(self.damping, at.symbols)
         total = SX(0)
-        for sign, depth, width in self._sides(at.x.q, at.symbols):
+        for sign, depth, width in self._stop_depths(at.x.q, at.symbols):
             share, ramp, _ = smooth_ramp(depth, width)
             spring = stiffness * ramp
             total += sign * spring + one_sided_damping(damping * share * at.x.v, spring)
         return total
 
-    def energy(self, at: Any) -> SX:
-        """Return the energy of the stop springs [J]; zero between the limits."""
+    def energy(self, at: At) -> SX:
+        """Return the energy of the stop springs [J]; zero between the limits.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         stiffness = to_sx(self.stiffness, at.symbols)
         areas = (
-            smooth_ramp(depth, width)[2] for _, depth, width in self._sides(at.x.q, at.symbols)
+            smooth_ramp(depth, width)[2]
+            for _, depth, width in self._stop_depths(at.x.q, at.symbols)
         )
         return stiffness * sum(areas, SX(0))
 
-    def _sides(self, q: SX, symbols: SymbolTable) -> list[tuple[float, SX, SX]]:
-        """Return (1 for upper or -1 for lower, depth beyond that limit, width) of each stop.
+    def _stop_depths(self, q: SX, symbols: SymbolTable) -> list[tuple[float, SX, SX]]:
+        """Return (sign, depth beyond the limit, width) [1, rad or m] of each stop at position q.
 
-        The depth [rad or m] is negative within the limits.
+        The sign is 1 for the upper and -1 for the lower limit. The depth is negative within the
+        limits.
         """
         width = to_sx(self.width, symbols)
         sides = []
@@ -714,10 +847,14 @@ class JointStop(JointForce):
 
 
 def smooth_ramp(depth: SX, width: SX) -> tuple[SX, SX, SX]:
-    """Return a slope rising smoothly from 0 to 1 over a width, and its first two integrals.
+    """Return a slope that rises smoothly from 0 to 1 over a width, and its first two integrals.
 
     With u = depth / width between 0 and 1 the slope is 3 u^2 - 2 u^3. Beyond the width the first
-    integral is depth - width / 2.
+    integral is depth - width / 2. All are zero for a negative depth.
+
+    Args:
+        depth: (1, 1) depth, such as the distance beyond a limit.
+        width: (1, 1) depth over which the slope rises, above zero.
     """
     u = casadi.fmin(casadi.fmax(depth / width, 0), 1)
     beyond = casadi.fmax(depth - width, 0)
@@ -773,12 +910,20 @@ class JointFriction(JointForce):
         self._require_positive("velocity", "width")
         self._require_effect("coulomb", "stribeck", "viscous")
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"effort": friction effort ON the joint [N m or N]}, opposed to its velocity."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"effort": friction effort ON the joint [N m or N]}, opposed to its velocity.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"effort": -self.resistance(at)}
 
-    def resistance(self, at: Any) -> SX:
-        """Return the friction effort (1, 1) of the class docstring; its sign is that of v."""
+    def resistance(self, at: At) -> SX:
+        """Return the friction effort (1, 1) of the class docstring; its sign is that of v.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         v, symbols = at.x.v, at.symbols
         coulomb = to_sx(self.coulomb, symbols)
         if self.stribeck != Number(0.0):
@@ -787,8 +932,12 @@ class JointFriction(JointForce):
         total: SX = to_sx(self.viscous, symbols) * v
         return total + coulomb * smooth_sign(v, to_sx(self.width, symbols))
 
-    def dissipation(self, at: Any) -> SX:
-        """Return the friction power: resistance times velocity [W], never negative."""
+    def dissipation(self, at: At) -> SX:
+        """Return the friction power: resistance times velocity [W], never negative.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(self.resistance(at) * at.x.v)
 
 
@@ -851,14 +1000,21 @@ class FixedTendon(CoordinateForce):
         return True
 
     def scoped(self, prefix: str) -> FixedTendon:
-        """Return a copy whose name, parameters and coordinates have the prefix "`prefix`."."""
+        """Return a copy whose name, parameters and coordinates have the prefix "`prefix`.".
+
+        Args:
+            prefix: text before the names, without the dot.
+        """
         inner = Component.scoped(self, prefix)
         return replace(inner, levers=tuple((f"{prefix}.{n}", c) for n, c in inner.levers))
 
-    def resistance(self, at: Any) -> SX:
+    def resistance(self, at: At) -> SX:
         """Return the tension of the class docstring [N]; negative if the tendon pushes.
 
         Damping and friction also act while the spring is slack.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         x, rate, symbols = at.x.q, at.x.v, at.symbols
         total = to_sx(self.stiffness, symbols) * self._stretch(x, symbols)
@@ -868,16 +1024,24 @@ class FixedTendon(CoordinateForce):
             total += to_sx(self.friction, symbols) * smooth_sign(rate, width)
         return total
 
-    def energy(self, at: Any) -> SX:
-        """Return stiffness times stretch^2 / 2 [J]; zero while the spring is slack."""
+    def energy(self, at: At) -> SX:
+        """Return stiffness times stretch^2 / 2 [J]; zero while the spring is slack.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return 0.5 * to_sx(self.stiffness, at.symbols) * self._stretch(at.x.q, at.symbols) ** 2
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"tension": tension [N]}, negative if the tendon pushes."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"tension": tension [N]}, negative if the tendon pushes.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"tension": self.resistance(at)}
 
     def _stretch(self, x: SX, symbols: SymbolTable) -> SX:
-        """Return x less its relaxed length [m]: positive above `length`, negative below.
+        """Return the elongation of the spring [m] at the length x: negative below `length`.
 
         With two lengths it is zero between them.
         """
@@ -887,7 +1051,10 @@ class FixedTendon(CoordinateForce):
         return casadi.fmax(x - high, 0) + casadi.fmin(x - low, 0)
 
     def _checked_levers(self) -> tuple[tuple[str, Expression], ...]:
-        """Return pairs (coordinate name, moment arm as expression); raise if a name is repeated."""
+        """Return `levers` as pairs (coordinate name, moment arm).
+
+        Raise DescriptionError for other forms, or if a name is repeated.
+        """
         pairs = named_scalars(self.levers) or []
         if not pairs or len({name for name, _ in pairs}) < len(pairs):
             raise DescriptionError(
@@ -947,8 +1114,12 @@ class RigidStop(JointContact):
         """True: the limits are limits of a position."""
         return True
 
-    def stops(self, at: Any) -> Mapping[str, Stop | OneWay]:
-        """Return {"": Stop} that keeps the coordinate between lower and upper [rad or m]."""
+    def stops(self, at: At) -> Mapping[str, Stop | OneWay]:
+        """Return {"": Stop} that keeps the coordinate between lower and upper [rad or m].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         lower, upper = self.limits(at)["x"]
         e, slowest = (to_sx(x, at.symbols) for x in (self.restitution, self.rest_speed))
         return {"": Stop(at.x.q, lower, upper, restitution=e, rest_speed=slowest)}
@@ -987,8 +1158,12 @@ class CoulombFriction(JointContact):
                 " nothing; give a strength or leave it out"
             )
 
-    def frictions(self, at: Any) -> Mapping[str, Friction]:
-        """Return {"": Friction} whose slip is the velocity of the coordinate [rad/s or m/s]."""
+    def frictions(self, at: At) -> Mapping[str, Friction]:
+        """Return {"": Friction} whose slip is the velocity of the coordinate [rad/s or m/s].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         assert self.sticking is not None
         sliding, sticking = (to_sx(x, at.symbols) for x in (self.sliding, self.sticking))
         return {"": Friction(at.x.v, sliding, sticking)}

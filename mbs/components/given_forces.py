@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
-from typing import Any
 
 import casadi
 from casadi import SX
 
 from mbs.components import custom
-from mbs.components.custom import Custom, Load
+from mbs.components.custom import At, Custom, Load
 from mbs.components.drives import Device, TwoFlanges
-from mbs.errors import DescriptionError
-from mbs.text import quoted
-
-_AXES = ("world", "body")
 
 
 class _GivenOnPoint(Custom):
@@ -26,11 +21,7 @@ class _GivenOnPoint(Custom):
 
     def __post_init__(self) -> None:
         Custom.__post_init__(self)
-        if self.axes not in _AXES:
-            raise DescriptionError(
-                f"{self.name}: axes is {quoted(self.axes)}; use 'world', or 'body' for those of the"
-                " point, which rotate with it"
-            )
+        self._require_axes()
 
 
 class ForceInput(_GivenOnPoint):
@@ -46,11 +37,14 @@ class ForceInput(_GivenOnPoint):
     y = custom.input("N")
     z = custom.input("N")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return {"point": force (x, y, z) ON the body [N]} at the origin of the point.
 
         The components are along the axes of the world or of the point, see `axes`. No other body
         gets a reaction.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         F = casadi.vertcat(at.x, at.y, at.z)
         return {"point": custom.force(F, own_axes=self.axes == "body")}
@@ -69,10 +63,13 @@ class TorqueInput(_GivenOnPoint):
     y = custom.input("N.m")
     z = custom.input("N.m")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return {"point": torque (x, y, z) ON the body [N m]}, without a reaction on other bodies.
 
         The components are along the axes of the world or of the point, see `axes`.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         T = casadi.vertcat(at.x, at.y, at.z)
         return {"point": custom.torque(T, own_axes=self.axes == "body")}
@@ -94,10 +91,13 @@ class PairForceInput(Custom):
     y = custom.input("N")
     z = custom.input("N")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the wrenches by "a" and "b": force (x, y, z) ON b at its origin, reaction ON a.
 
         Each is in axes of its own frame, about its own origin [N, N m].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         F = casadi.vertcat(at.x, at.y, at.z)
         on_a = custom.FrameLoad(-F, -casadi.cross(at.a.to(at.b).p, F))
@@ -119,10 +119,13 @@ class PairTorqueInput(Custom):
     y = custom.input("N.m")
     z = custom.input("N.m")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the torques by "a" and "b": (x, y, z) ON b, the opposite ON a [N m].
 
         The inputs are along the axes of a. Each load is converted to axes of its own frame.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         T = casadi.vertcat(at.x, at.y, at.z)
         return custom.between(at.a, at.b, custom.FrameLoad(SX.zeros(3), -T), T)
@@ -143,15 +146,20 @@ class LineForceInput(Custom):
     length = custom.output("m")
     speed = custom.output("m/s")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the forces ON the points "a" and "b".
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return the forces ON the points "a" and "b": `tension` [N], towards the other point.
 
-        Each `tension` [N] towards the other point.
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return custom.pull(at.a, at.b, at.tension)
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return "length": distance of the points [m], and "speed": its rate [m/s]."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return "length": distance of the points [m], and "speed": its rate [m/s].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         motion = at.a.to(at.b)
         return {"length": motion.length, "speed": motion.rate}
 
@@ -169,8 +177,12 @@ class JointEffort(Custom):
     joint = custom.coordinate()
     tau = custom.input(custom.EFFORT)
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return {"joint": effort ON the coordinate [N m or N]}, equal to the input `tau`."""
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return {"joint": effort ON the coordinate [N m or N]}, equal to the input `tau`.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"joint": at.tau}
 
 
@@ -179,8 +191,12 @@ class ShaftTorqueInput(TwoFlanges):
 
     tau = custom.input("N.m")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the torques ON the shafts [N m]: `tau` on "flange_b", -`tau` on "flange_a"."""
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return the torques ON the shafts [N m]: `tau` on "flange_b", -`tau` on "flange_a".
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"flange_a": -at.tau, "flange_b": at.tau}
 
 
@@ -191,8 +207,12 @@ class SlidingForceInput(TwoFlanges):
     flange_b = custom.flange(slides=True)
     force = custom.input("N")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the forces ON the flanges [N]: `force` on "flange_b", -`force` on "flange_a"."""
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return the forces ON the flanges [N]: `force` on "flange_b", -`force` on "flange_a".
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"flange_a": -at.force, "flange_b": at.force}
 
 
@@ -206,10 +226,18 @@ class ForceSource(Device):
     force = custom.input("N")
     v = custom.output("m/s")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return {"flange": force ON the sliding part [N]}, equal to the input `force`."""
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return {"flange": force ON the sliding part [N]}, equal to the input `force`.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"flange": at.force}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"v": velocity of the flange [m/s]}."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"v": velocity of the flange [m/s]}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"v": at.flange.speed}

@@ -8,13 +8,12 @@ pressure means that a real cylinder would cavitate.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import casadi
 from casadi import SX
 
 from mbs.components import custom
-from mbs.components.custom import Custom, Load
+from mbs.components.custom import At, Custom, Load
 from mbs.components.forces import one_sided_damping, smooth_ramp
 
 
@@ -69,8 +68,12 @@ class HydraulicCylinder(Custom):
     flow_b = custom.input("m3/s")
     force = custom.output("N")
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return the rates of the gauge pressures p_a and p_b of the two chambers [Pa/s]."""
+    def rates(self, at: At) -> Mapping[str, SX]:
+        """Return the rates of the gauge pressures p_a and p_b of the two chambers [Pa/s].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         motion = at.a.to(at.b)
         s, rate = motion.length - at.closed, motion.rate
         past = at.leakage * (at.p_a - at.p_b)
@@ -80,36 +83,45 @@ class HydraulicCylinder(Custom):
             "p_b": at.bulk / volume_b * (at.flow_b + at.area_b * rate + past),
         }
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the forces ON the points "a" and "b".
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return the forces ON the points "a" and "b": `force` [N], away from the other point.
 
-        Each `force` [N] away from the other point.
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return custom.pull(at.a, at.b, -self._force(at))
 
-    def energy(self, at: Any) -> SX:
-        """Return the energy of the end stops [J], zero between them; the oil is not included."""
-        return SX(at.end_stiffness * sum((area for _, _, _, area in self._ends(at)), SX(0)))
+    def energy(self, at: At) -> SX:
+        """Return the energy of the end stops [J], zero between them; the oil is not included.
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"force": total force of the class docstring [N]}, positive if it pushes."""
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
+        return SX(at.end_stiffness * sum((area for _, _, _, area in self._end_stops(at)), SX(0)))
+
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"force": total force of the class docstring [N]}, positive if it pushes.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"force": self._force(at)}
 
-    def _force(self, at: Any) -> SX:
+    def _force(self, at: At) -> SX:
         """Return pressure force, friction and end stop force [N]; positive if it pushes apart."""
         rate = at.a.to(at.b).rate
         total = at.p_a * at.area_a - at.p_b * at.area_b - at.friction * rate
-        for sign, share, depth, _ in self._ends(at):
+        for sign, share, depth, _ in self._end_stops(at):
             spring = at.end_stiffness * depth
             total += sign * spring - one_sided_damping(at.end_damping * share * rate, spring)
         return SX(total)
 
     @staticmethod
-    def _ends(at: Any) -> list[tuple[float, SX, SX, SX]]:
-        """Return sign, ramp slope, ramp [m] and its integral [m^2] of the stops at 0 and at stroke.
+    def _end_stops(at: At) -> list[tuple[float, SX, SX, SX]]:
+        """Return (sign, ramp slope, ramp [m], integral of the ramp [m^2]) of the two end stops.
 
-        The sign is 1 if the stop pushes the points apart. The rest is zero while it is not in
-        contact.
+        The sign is 1 at s = 0, where the stop pushes the points apart, and -1 at s = stroke. The
+        other values are zero without contact, see `smooth_ramp`.
         """
         s = at.a.to(at.b).length - at.closed
         sides = ((1.0, -s), (-1.0, s - at.stroke))
@@ -146,8 +158,12 @@ class HydraulicValve(Custom):
     flow_a = custom.output("m3/s")
     flow_b = custom.output("m3/s")
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return flow_a and flow_b: flows from the valve INTO chambers a and b [m^3/s]."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return flow_a and flow_b: flows from the valve INTO chambers a and b [m^3/s].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         s = casadi.fmin(casadi.fmax(at.spool, -1), 1)
         ahead, back = casadi.fmax(s, 0), casadi.fmax(-s, 0)
         fill_a, drain_a = self._flow(at, at.supply - at.p_a), self._flow(at, at.p_a - at.tank)
@@ -158,7 +174,10 @@ class HydraulicValve(Custom):
         }
 
     @staticmethod
-    def _flow(at: Any, drop: SX) -> SX:
-        """Return the flow through a fully open edge [m^3/s]; its sign is that of `drop` [Pa]."""
+    def _flow(at: At, drop: SX) -> SX:
+        """Return the flow through a fully open edge at the pressure difference `drop` [Pa] [m^3/s].
+
+        It has the sign of `drop`.
+        """
         root = drop / (drop**2 + at.transition**2) ** 0.25
         return SX(at.rated_flow * root / casadi.sqrt(at.rated_drop))

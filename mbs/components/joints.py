@@ -63,7 +63,11 @@ class Freedom:
     suffix: str = ""
 
     def coordinate_of(self, joint: str) -> str:
-        """Return the name of its coordinate: "JOINT", or "JOINT.SUFFIX" if it has a suffix."""
+        """Return the name of its coordinate: "JOINT", or "JOINT.SUFFIX" if it has a suffix.
+
+        Args:
+            joint: name of the joint.
+        """
         return f"{joint}.{self.suffix}" if self.suffix else joint
 
 
@@ -79,17 +83,24 @@ Rows = list[tuple[str, SX]]
 
 
 def position_rows(pose: Pose, axes: str) -> Rows:
-    """Return a row "force AXIS" for each letter in `axes`: position of frame_b along it [m].
+    """Return constraint rows "force AXIS": coordinates of the origin of frame_b in frame_a [m].
 
-    The position is that of the origin of frame_b in frame_a, along an axis of frame_a.
+    Args:
+        pose: pose of frame_b relative to frame_a.
+        axes: letters x, y or z of the axes of frame_a, one row each.
     """
     return [(f"force {axis}", pose.p["xyz".index(axis)]) for axis in axes]
 
 
 def tilt_rows(pose: Pose) -> Rows:
-    """Return "moment y", "moment x": cosines of z of frame_b with x and with y of frame_a.
+    """Return the rows "moment y" and "moment x" of parallel z axes.
+
+    They are the cosines of z of frame_b with x and with y of frame_a.
 
     Both are zero if the z axes of the two frames are parallel or opposed.
+
+    Args:
+        pose: pose of frame_b relative to frame_a.
     """
     return [("moment y", pose.R[0, 2]), ("moment x", pose.R[1, 2])]
 
@@ -98,6 +109,9 @@ def orientation_rows(pose: Pose) -> Rows:
     """Return rows "moment x", "moment y", "moment z" that are zero if the frames are parallel.
 
     The values are sin(theta) u, in axes of frame_a, for the rotation of frame_b by theta about u.
+
+    Args:
+        pose: pose of frame_b relative to frame_a.
     """
     R = pose.R
     return [
@@ -108,27 +122,44 @@ def orientation_rows(pose: Pose) -> Rows:
 
 
 def weld_rows(pose: Pose) -> Rows:
-    """Return the six rows "force x" .. "moment z" that are zero if the frames coincide."""
+    """Return the six rows "force x" .. "moment z" that are zero if the frames coincide.
+
+    Args:
+        pose: pose of frame_b relative to frame_a.
+    """
     return [*position_rows(pose, "xyz"), *orientation_rows(pose)]
 
 
 def along_z(pose: Pose, axis: Sequence[float]) -> Pose:
-    """Return the pose of frame_b in frame_a, both rotated by one rotation so that z is `axis`."""
+    """Return the pose of frame_b in frame_a after both frames are rotated so that z is `axis`.
+
+    Args:
+        pose: pose of frame_b relative to frame_a.
+        axis: three numbers, the direction of the new z axis in each frame.
+    """
     inside = Pose.rotation(align_z(axis))
     return inside.inverse() @ pose @ inside
 
 
 def cosine(pose: Pose, axis: Sequence[float]) -> SX:
-    """Return the cosine between a vector `axis` fixed in frame_b and the same vector in frame_a.
+    """Return the cosine between a vector fixed in frame_b and the same vector in frame_a.
 
-    The value is 1 for parallel vectors and -1 for opposed vectors.
+    The value is 1 for parallel and -1 for opposed vectors.
+
+    Args:
+        pose: pose of frame_b relative to frame_a.
+        axis: unit vector, three numbers.
     """
     z = SX(DM(list(axis)))
     return casadi.dot(z, casadi.mtimes(pose.R, z))
 
 
 def diagonal(pose: Pose) -> list[SX]:
-    """Return the cosines x-x, y-y and z-z between equal axes of frame_b and frame_a."""
+    """Return the cosines x-x, y-y and z-z between equal axes of frame_b and frame_a.
+
+    Args:
+        pose: pose of frame_b relative to frame_a.
+    """
     return [pose.R[k, k] for k in range(3)]
 
 
@@ -204,7 +235,7 @@ def motor_range(where: str, quantity: str, given: Any) -> Range | None:
     """
     if given is None:
         return None
-    lower, upper = _pair(given) if np.ndim(given) else _both(given)
+    lower, upper = _as_pair(given) if np.ndim(given) else _symmetric_range(given)
     if not lower < upper or lower > 0 or upper < 0:
         raise DescriptionError(
             f"{where}: {quantity} is {quoted(given)}; give the largest one, above zero, or"
@@ -213,13 +244,13 @@ def motor_range(where: str, quantity: str, given: Any) -> Range | None:
     return lower, upper
 
 
-def _both(given: Any) -> Range:
-    """Return (-given, given); NaN if it is not a number."""
-    largest = _pair((given, given))[0]
+def _symmetric_range(given: Any) -> Range:
+    """Return (-given, given) as floats; (NaN, NaN) if it is not a number."""
+    largest = _as_pair((given, given))[0]
     return -largest, largest
 
 
-def _pair(pair: Any) -> Range:
+def _as_pair(pair: Any) -> Range:
     """Return (low, high) as floats; (NaN, NaN) if the value is not a pair of numbers."""
     if has_boolean(pair):
         return math.nan, math.nan
@@ -231,13 +262,17 @@ def _pair(pair: Any) -> Range:
 
 
 def _interval(name: str, suffix: Any, pair: Any, known: set[str]) -> Range:
-    """Return (lower, upper); raise if the suffix is unknown or the pair is not in order."""
+    """Return the range `pair` as (lower, upper) floats.
+
+    Raise DescriptionError if it is not in order, or if `suffix` is not in `known`, the suffixes of
+    the coordinates of the joint `name`.
+    """
     if suffix not in known:
         raise DescriptionError(
             f"{name}: limits {quoted(pair)} name no coordinate of one number; "
             + (f"give a mapping from {sorted(known)}" if known else "leave them out")
         )
-    low, high = _pair(pair)
+    low, high = _as_pair(pair)
     if not low < high:
         raise DescriptionError(
             f"{name}: limits {quoted(pair)} are not (lower, upper); give two numbers in order"
@@ -325,16 +360,17 @@ class Joint(Component):
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows | None:
         """Return label and value of the constraint rows of the cut joint; None if it cannot be cut.
 
-        A joint without rows stays in the tree, and its free end is welded.
+        All rows are zero if the loop is closed. A joint without rows stays in the tree, and its
+        free end is welded.
 
         Args:
-            pose: pose of frame_b in frame_a.
-            symbols: CasADi symbol of every parameter.
+            pose: pose of frame_b relative to frame_a.
+            symbols: CasADi symbol of each parameter, by name.
         """
         return None
 
     def facing(self, pose: Pose) -> list[SX]:
-        """Return cosines that must all be positive in a closed loop, in addition to the zero rows.
+        """Return cosines that must be positive in a closed loop, in addition to the zero rows.
 
         The constraint rows are also zero if an axis of frame_b is opposed to that of frame_a.
         Positive cosines exclude these configurations. The list is empty if none exist.
@@ -396,7 +432,10 @@ class Joint(Component):
 
     @property
     def carries_effort(self) -> bool:
-        """Whether `actuated` is True, or friction, rotor inertia, a spring or a rotor is given."""
+        """Whether the joint is actuated, or has friction, rotor inertia, a spring or a rotor.
+
+        `actuated` must be True; None counts as not actuated.
+        """
         efforts = (expression(value) for value in (self.Fv, self.Fs, self.Ia, self.stiffness))
         acts = self.rotor is not None or any(effort != Number(0.0) for effort in efforts)
         return bool(self.actuated) or acts
@@ -409,7 +448,7 @@ class Joint(Component):
             yield "inertia of the rotor", self.rotor.inertia
 
     def _refuse_drive(self) -> None:
-        """Raise if a spring, rotor or motor limits are given to a joint without one coordinate."""
+        """Raise DescriptionError if a spring, rotor or motor limits need one coordinate."""
         given = [name for name in ("stiffness", "rest") if getattr(self, name) != Number(0.0)]
         given += [n for n in ("rotor", "velocity", "effort") if getattr(self, n) is not None]
         for name in given:
@@ -421,7 +460,11 @@ class Joint(Component):
 
 @dataclass(frozen=True, slots=True)
 class _AxisJoint(Joint):
-    """A joint with an axis in frame_a: "x", "y", "z", "-x" .. or three numbers."""
+    """Base of joints with an axis.
+
+    Attributes:
+        axis: axis in frame_a: "x", "y", "z", "-x", "-y", "-z", or three numbers.
+    """
 
     axis: Any = "z"
 
@@ -440,12 +483,21 @@ class Revolute(_AxisJoint):
         return (Freedom(Motion.REVOLUTE, self.axis),)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return five rows: coincident origins, and parallel joint axes of frame_a and frame_b."""
+        """Return five rows: coincident origins, and parallel joint axes of frame_a and frame_b.
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+            symbols: CasADi symbol of each parameter, by name.
+        """
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "xyz"), *tilt_rows(pose)]
 
     def facing(self, pose: Pose) -> list[SX]:
-        """Return the cosine between the joint axes of both frames, positive if not opposed."""
+        """Return the cosine between the joint axes of both frames, positive if not opposed.
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+        """
         return [cosine(pose, self.axis)]
 
 
@@ -459,12 +511,21 @@ class Prismatic(_AxisJoint):
         return (Freedom(Motion.PRISMATIC, self.axis),)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return five rows: no displacement across the axis, and no rotation."""
+        """Return five rows: no displacement across the axis, and no rotation.
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+            symbols: CasADi symbol of each parameter, by name.
+        """
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "xy"), *orientation_rows(pose)]
 
     def facing(self, pose: Pose) -> list[SX]:
-        """Return the cosines x-x, y-y, z-z of both frames, positive if the axes are not opposed."""
+        """Return the cosines x-x, y-y, z-z of both frames, positive if the axes are not opposed.
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+        """
         return diagonal(pose)
 
 
@@ -481,12 +542,21 @@ class Cylindrical(_AxisJoint):
         )
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return four rows: no displacement across the axis, and parallel axes of both frames."""
+        """Return four rows: no displacement across the axis, and parallel axes of both frames.
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+            symbols: CasADi symbol of each parameter, by name.
+        """
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "xy"), *tilt_rows(pose)]
 
     def facing(self, pose: Pose) -> list[SX]:
-        """Return the cosine between the joint axes of both frames, positive if not opposed."""
+        """Return the cosine between the joint axes of both frames, positive if not opposed.
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+        """
         return [cosine(pose, self.axis)]
 
 
@@ -508,12 +578,21 @@ class Planar(_AxisJoint):
         )
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return three rows: no displacement along the normal `axis`, and parallel normals."""
+        """Return three rows: no displacement along the normal `axis`, and parallel normals.
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+            symbols: CasADi symbol of each parameter, by name.
+        """
         pose = along_z(pose, self.axis)
         return [*position_rows(pose, "z"), *tilt_rows(pose)]
 
     def facing(self, pose: Pose) -> list[SX]:
-        """Return the cosine between the normals of both frames, positive if not opposed."""
+        """Return the cosine between the normals of both frames, positive if not opposed.
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+        """
         return [cosine(pose, self.axis)]
 
 
@@ -642,6 +721,10 @@ class Universal(Joint):
 
         "moment across" is the cosine between the first axis in frame_a and the second axis in
         frame_b.
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+            symbols: CasADi symbol of each parameter, by name.
         """
         first, second = (SX(DM(list(axis))) for axis in self.axes)
         across = casadi.dot(first, casadi.mtimes(pose.R, second))
@@ -661,7 +744,12 @@ class Spherical(Joint):
         return (Freedom(Motion.SPHERICAL),)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return three rows: position of the origin of frame_b in frame_a [m]."""
+        """Return three rows: position of the origin of frame_b in frame_a [m].
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+            symbols: CasADi symbol of each parameter, by name.
+        """
         return position_rows(along_z(pose, (0.0, 0.0, 1.0)), "xyz")
 
 
@@ -679,7 +767,12 @@ class Free(Joint):
         return (Freedom(Motion.FREE),)
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return no rows: a free joint constrains nothing."""
+        """Return no rows: a free joint constrains nothing.
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+            symbols: CasADi symbol of each parameter, by name.
+        """
         return []
 
 
@@ -693,11 +786,20 @@ class Fixed(Joint):
         return ()
 
     def closing_rows(self, pose: Pose, symbols: SymbolTable) -> Rows:
-        """Return six rows: coincident origins and no rotation."""
+        """Return six rows: coincident origins and no rotation.
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+            symbols: CasADi symbol of each parameter, by name.
+        """
         return weld_rows(pose)
 
     def facing(self, pose: Pose) -> list[SX]:
-        """Return the cosines x-x, y-y, z-z of both frames, positive if the axes are not opposed."""
+        """Return the cosines x-x, y-y, z-z of both frames, positive if the axes are not opposed.
+
+        Args:
+            pose: pose of frame_b relative to frame_a.
+        """
         return diagonal(pose)
 
 

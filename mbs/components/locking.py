@@ -59,10 +59,11 @@ class _Locks:
     changed: dict[str, Coupling] = field(default_factory=dict)
 
     def add(self, name: str, given: Any) -> None:
-        """Record the position of the joint `name`: a number, or one number per element of its q.
+        """Record the position `given` of the joint `name`.
 
-        Angles are in rad, lengths in m, and quaternions are w, x, y, z. Raise if their number
-        differs.
+        It is a number, or one number per element of its q: angles in rad, lengths in m, quaternions
+        w, x, y, z. Raise DescriptionError if the number of values differs or the joint does not
+        exist.
         """
         joint = self._joint(name)
         where = f"{self.mechanism.name}: lock of {name}"
@@ -81,10 +82,7 @@ class _Locks:
             at += freedom.motion.nq
 
     def _joint(self, name: str) -> Joint:
-        """Return the joint `name`.
-
-        Raise DescriptionError if it does not exist or has no coordinate.
-        """
+        """Return the joint `name`; raise DescriptionError if it does not exist or cannot move."""
         joints = {
             joint.name: joint
             for joint in self.mechanism.joints()
@@ -101,7 +99,7 @@ class _Locks:
         """Lock the joints whose positions follow from locked joints by couplings, repeatedly.
 
         Couplings without unlocked coordinates are recorded in `gone`, reduced couplings in
-        `changed`.
+        `changed`. Raise DescriptionError if a coupling contradicts the locked positions.
         """
         pending = list(self.mechanism.couplings())
         while True:
@@ -110,16 +108,19 @@ class _Locks:
                 return
             for coupling in touched:
                 pending.remove(coupling)
-                left = self._among_free(coupling)
+                left = self._in_free_coordinates(coupling)
                 if set(left.coordinates) & self.values.keys():
-                    self._follow(left)
+                    self._lock_coupled(left)
                     self.gone.add(left.name)
                 else:  # it couples only free joints, so far
                     self.changed[left.name] = left
                     pending.append(left)
 
-    def _among_free(self, coupling: Coupling) -> Coupling:
-        """Return a coupling without its locked coordinates, whose constant terms join c_0."""
+    def _in_free_coordinates(self, coupling: Coupling) -> Coupling:
+        """Return a coupling of its unlocked coordinates, with the locked ones in its constant term.
+
+        A coupling of two coordinates is returned unchanged.
+        """
         if not coupling.others:
             return coupling
         offset = sum(
@@ -146,9 +147,9 @@ class _Locks:
         return left
 
     def _linear(self, coupling: Coupling) -> tuple[Expression, Expression]:
-        """Return (offset, factor) of driven = offset + factor driver.
+        """Return (offset, factor) of a coupling driven = offset + factor driver.
 
-        Raise DescriptionError if the polynomial is not linear or its factor is zero.
+        Raise DescriptionError if its polynomial is not linear or its factor is zero.
         """
         terms = [expression(c) for c in coupling.coefficients]
         offset, factor = (*terms, Number(0.0), Number(0.0))[:2]
@@ -159,8 +160,11 @@ class _Locks:
             )
         return offset, factor
 
-    def _follow(self, coupling: Coupling) -> None:
-        """Lock the unlocked coordinate of a coupling; raise if both are locked and disagree."""
+    def _lock_coupled(self, coupling: Coupling) -> None:
+        """Lock the unlocked coordinate of a coupling of two coordinates.
+
+        Raise DescriptionError if both are locked and disagree.
+        """
         driver, driven = (self.values.get(name) for name in (coupling.driver, coupling.driven))
         if driver is None:
             assert driven is not None
@@ -178,12 +182,15 @@ class _Locks:
             )
 
     def _driver(self, coupling: Coupling, driven: Expression) -> Expression:
-        """Return the position of the driver at the position `driven` of a linear coupling."""
+        """Return the position of the driver of a linear coupling at the position `driven`."""
         offset, factor = self._linear(coupling)
         return (driven - offset) / factor
 
     def _add_coupled(self, coupling: Coupling, coordinate: str, value: Expression) -> None:
-        """Lock the joint of a coordinate; raise if the joint has several coordinates."""
+        """Lock the joint of a coordinate at `value`, as `coupling` requires.
+
+        Raise DescriptionError if the joint has several coordinates.
+        """
         joint = self.mechanism.components.get(coordinate)
         if not isinstance(joint, Joint):
             raise DescriptionError(
@@ -194,7 +201,10 @@ class _Locks:
 
 
 def _polynomial(coupling: Coupling, driver: Expression) -> Expression:
-    """Return the driven position at the position `driver`; a Number if it has a value."""
+    """Return the driven position of a coupling at the position `driver`.
+
+    It is a Number if it has a value.
+    """
     value = expression(0.0)
     for coefficient in reversed(coupling.coefficients):
         value = value * driver + expression(coefficient)
@@ -203,10 +213,15 @@ def _polynomial(coupling: Coupling, driver: Expression) -> Expression:
 
 
 def lock(mechanism: Description, positions: Mapping[str, Any]) -> None:
-    """Replace joints of a mechanism by welds at given positions, in place.
+    """Replace joints of a mechanism by welds at given positions, in place; see `Mechanism.lock`.
 
-    `positions` maps a joint name to its position. Joints that couplings tie to them are welded too.
-    See `Mechanism.lock`.
+    Args:
+        mechanism: mechanism to change. Joints that couplings tie to locked joints are welded too.
+        positions: position by joint name [rad or m]; a sequence for joints with several
+            coordinates.
+
+    Raises:
+        DescriptionError: a joint or position is invalid, or another component uses the joint.
     """
     locks = _Locks(mechanism)
     for name, given in positions.items():
@@ -230,7 +245,9 @@ def lock(mechanism: Description, positions: Mapping[str, Any]) -> None:
     for name, component in mechanism.components.items():
         if name in locks.gone or _acts_on(component, locks.values):
             continue
-        kept[name] = welds.get(name) or locks.changed.get(name) or _with_points(component, reattach)
+        if isinstance(component, OnPoints):
+            component = with_points(component, reattach)
+        kept[name] = welds.get(name) or locks.changed.get(name) or component
     mechanism.components = kept
     mechanism.connections = [(reattach(a), reattach(b)) for a, b in mechanism.connections]
     mechanism.frames = {name: reattach(point) for name, point in mechanism.frames.items()}
@@ -244,14 +261,17 @@ def lock(mechanism: Description, positions: Mapping[str, Any]) -> None:
 
 
 def _acts_on(component: Component, coordinates: Mapping[str, Expression]) -> bool:
-    """Return whether all coordinates of a force element are locked, so that it has no effect."""
+    """Return whether a component is a force element whose coordinates are all locked.
+
+    It then has no effect. `coordinates` has the locked coordinates as keys.
+    """
     return isinstance(component, CoordinateForce) and all(
         name in coordinates for name, _ in component.levers
     )
 
 
 def _require_free_of_others(mechanism: Description, locks: _Locks) -> None:
-    """Raise if a drive line, a sensor or a component also uses a joint to lock.
+    """Raise DescriptionError if a drive line, a sensor or a component uses a joint to lock.
 
     A force element on locked coordinates only is allowed.
     """
@@ -285,13 +305,11 @@ def _require_free_of_others(mechanism: Description, locks: _Locks) -> None:
             )
 
 
-def _with_points(component: Component, reattach: Any) -> Component:
-    """Return a copy with `reattach` applied to each point; components without points unchanged."""
-    return with_points(component, reattach) if isinstance(component, OnPoints) else component
-
-
 def _steps(mechanism: Description, name: str, values: Sequence[Expression]) -> tuple[Step, ...]:
-    """Return the displacement steps from frame_a to frame_b of a joint at a position."""
+    """Return the displacement steps from frame_a to frame_b of the joint `name`.
+
+    `values` is its position, one expression per element of q.
+    """
     joint = mechanism.components[name]
     assert isinstance(joint, Joint)
     steps: list[Step] = []
@@ -304,7 +322,10 @@ def _steps(mechanism: Description, name: str, values: Sequence[Expression]) -> t
 
 
 def _freedom_steps(where: str, freedom: Freedom, values: Sequence[Expression]) -> Iterable[Step]:
-    """Return the displacement steps of an elementary motion at its position `values`."""
+    """Return the displacement steps of an elementary motion at its position `values`.
+
+    `where` is named in error messages.
+    """
     match freedom.motion:
         case Motion.PRISMATIC:
             return [
@@ -333,7 +354,10 @@ def _axis_rotation(axis: Sequence[float], angle: Expression) -> list[Step]:
 
 
 def _orientation(where: str, values: Sequence[Scalar]) -> FixedRotation:
-    """Return the rotation of a unit quaternion (w, x, y, z). Raise if its length is not 1."""
+    """Return the rotation of a unit quaternion (w, x, y, z).
+
+    Raise DescriptionError, with the name `where`, if its length is not 1.
+    """
     numbers = [to_float(expression(value)) for value in values]
     length = math.nan if None in numbers else math.hypot(*(n or 0.0 for n in numbers))
     if not abs(length - 1) < 1e-6:  # quaternions in files have about six digits
@@ -361,7 +385,7 @@ FREE_JOINT = "root_joint"
 
 
 def free_root(mechanism: Description) -> None:
-    """Replace the single weld of a body to the world by a Free joint, unless a Free joint exists.
+    """Replace the weld of a body to the world by a Free joint, unless a Free joint exists.
 
     Args:
         mechanism: mechanism, changed in place.
@@ -387,7 +411,10 @@ def free_root(mechanism: Description) -> None:
 
 
 def fix_root(mechanism: Description) -> None:
-    """Weld Free joints on the world, in place, at their positions in `guess` (zero by default)."""
+    """Weld the Free joints on the world of a mechanism, in place.
+
+    They are welded at their positions in `guess`, zero by default.
+    """
     positions = {}
     for joint, forward in _free_joints(mechanism):
         names = ("x", "y", "z", "qw", "qx", "qy", "qz")
@@ -406,7 +433,7 @@ def _inverse(values: Sequence[float]) -> list[float]:
 
 
 def _free_joints(mechanism: Description) -> list[tuple[str, bool]]:
-    """Return (name, flag) of each Free joint with a frame fixed to the world.
+    """Return (name, flag) of each Free joint that has a frame fixed to the world.
 
     The flag is True if this frame is frame_a, False if it is frame_b.
     """

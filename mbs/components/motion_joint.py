@@ -11,7 +11,7 @@ from casadi import SX
 
 from mbs.components import custom
 from mbs.components.component import Point
-from mbs.components.custom import Custom, Row
+from mbs.components.custom import At, Custom, Row
 from mbs.components.joints import Free
 from mbs.errors import DescriptionError
 from mbs.spatial import Pose, vector
@@ -46,20 +46,34 @@ class MotionJoint(Custom):
                 " pose of frame_b in frame_a"
             )
 
-    def motion(self, at: Any) -> Pose:
-        """Return the required pose of frame_b in frame_a, a function of the coordinates in `at`."""
+    def motion(self, at: At) -> Pose:
+        """Return the required pose of frame_b relative to frame_a.
+
+        A subclass writes it with `rotation` and `translation`.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         raise NotImplementedError
 
     def between(self, a: Point, b: Point) -> tuple[MotionJoint, Free]:
-        """Return a copy of the joint on points a and b, and a Free joint to connect a and b."""
+        """Return a copy of the joint on two points, and a Free joint to connect the points.
+
+        Args:
+            a: point for frame_a.
+            b: point for frame_b.
+        """
         points: dict[str, Any] = {"frame_a": a, "frame_b": b}
         return replace(self, **points), Free(f"{self.name}.free")
 
-    def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return six rows: position and rotation of frame_b relative to the pose of `motion`.
+    def rows(self, at: At) -> Mapping[str, Row | SX]:
+        """Return six rows: position and rotation error of frame_b relative to the pose of `motion`.
 
         "force x", "force y", "force z" are the position error in axes of frame_a [m]. "moment x",
         "moment y", "moment z" are the rotation error sin(theta) u in axes of `motion`.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         offset, R = self._displacement(at)
         p = casadi.vertsplit(casadi.densify(offset))
@@ -69,18 +83,22 @@ class MotionJoint(Custom):
             **{f"moment {a}": Row(0.5 * r, "1") for a, r in zip("xyz", (x, y, z), strict=True)},
         }
 
-    def positive(self, at: Any) -> Mapping[str, SX]:
-        """Return "axis x", "axis y", "axis z": cosines between the axes of frame_b and of `motion`.
+    def positive(self, at: At) -> Mapping[str, SX]:
+        """Return "axis x", "axis y", "axis z": cosines between axes of frame_b and of `motion`.
 
         Positive values exclude configurations whose rows are zero with an opposed axis.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         _, R = self._displacement(at)
         return {f"axis {axis}": R[k, k] for k, axis in enumerate("xyz")}
 
-    def _displacement(self, at: Any) -> tuple[SX, SX]:
-        """Return frame_b relative to the pose of `motion`: position error (3, 1), rotation (3, 3).
+    def _displacement(self, at: At) -> tuple[SX, SX]:
+        """Return the position error (3, 1) and the rotation (3, 3) of frame_b relative to `motion`.
 
-        The position error is in axes of frame_a [m], the rotation in axes of `motion`.
+        The position error is in axes of frame_a [m], the rotation in axes of `motion`. Raise
+        DescriptionError if `motion` returns no pose.
         """
         seen, target = at.frame_a.to(at.frame_b), self.motion(at)
         if not isinstance(target, Pose):
@@ -92,12 +110,20 @@ class MotionJoint(Custom):
 
 
 def rotation(axis: str, angle: Any) -> Pose:
-    """Return the pose of a frame rotated by `angle` [rad] about "x", "y" or "z"."""
+    """Return the pose of a frame rotated about a coordinate axis.
+
+    Args:
+        axis: "x", "y" or "z".
+        angle: angle [rad], a number or an expression.
+
+    Raises:
+        DescriptionError: the axis is another value.
+    """
     if axis not in ("x", "y", "z"):
         raise DescriptionError(f'a rotation is about {quoted(axis)}; give "x", "y" or "z"')
     return Pose.about(axis, SX(angle))
 
 
 def translation(x: Any = 0, y: Any = 0, z: Any = 0) -> Pose:
-    """Return the pose of a displacement by (x, y, z) [m] without rotation."""
+    """Return the pose of a frame displaced by (x, y, z) [m], numbers or expressions."""
     return Pose.translation(vector([SX(x), SX(y), SX(z)]))

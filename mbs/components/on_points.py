@@ -15,7 +15,10 @@ P = TypeVar("P", bound="OnPoints")
 
 @dataclass(frozen=True, slots=True)
 class OnPoints(Component):
-    """Base of components that have attachment points as fields: `add` alone places them."""
+    """Base of components that have attachment points as fields.
+
+    They are placed by `Mechanism.add` alone, without a connection.
+    """
 
     @property
     def points(self) -> tuple[Point, ...]:
@@ -23,20 +26,27 @@ class OnPoints(Component):
         return ()
 
     def scoped(self: P, prefix: str) -> P:
-        """Return a copy whose name, parameters and owners of points have the prefix "`prefix`."."""
+        """Return a copy whose name, parameters and owners of points have the prefix "`prefix`.".
+
+        Args:
+            prefix: text before the names, without the dot.
+        """
         return with_points(
             Component.scoped(self, prefix),
             lambda point: replace(point, owner=Component(f"{prefix}.{point.owner.name}")),
         )
 
     def _take_point(self, name: str) -> None:
-        """Replace a body in the field `name` by its reference frame. Raise if it is no point."""
+        """Replace a body in the field `name` by its reference frame, in place.
+
+        Raise DescriptionError if the field is neither a body nor a point.
+        """
         object.__setattr__(self, name, self._as_point(getattr(self, name), name))
 
     def _as_point(self, value: Any, name: str) -> Point:
         """Return a point, or the reference frame of a body.
 
-        Raise DescriptionError for other values.
+        Raise DescriptionError for other values. `name` is the field in the message.
         """
         if isinstance(value, RigidBody):
             value = value.frame
@@ -46,6 +56,16 @@ class OnPoints(Component):
                 " joint.frame_a"
             )
         return value
+
+    def _require_axes(
+        self,
+        allowed: tuple[str, ...] = ("world", "body"),
+        meaning: str = "'world', or 'body' for those of the point, which rotate with it",
+    ) -> None:
+        """Raise DescriptionError if the field `axes` is not allowed; `meaning` is the advice."""
+        axes = getattr(self, "axes", None)
+        if axes not in allowed:
+            raise DescriptionError(f"{self.name}: axes is {quoted(axes)}; use {meaning}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from casadi import SX
 
 from mbs.components import custom
 from mbs.components.component import Point
-from mbs.components.custom import Custom, FrameLoad, Load, Row
+from mbs.components.custom import At, Custom, FrameLoad, Load, Row
 from mbs.components.forces import one_sided_damping, smooth_ramp
 from mbs.errors import DescriptionError
 from mbs.text import quoted
@@ -42,12 +42,12 @@ class _Rope(Custom):
         """Map from "p0", "p1", ... to the points of `path`, in order."""
         return {f"p{k}": point for k, point in enumerate(self.path)}
 
-    def _segments(self, at: Any) -> list[tuple[Any, Any]]:
+    def _segments(self, at: At) -> list[tuple[Any, Any]]:
         """Return the two end frames of each straight segment, in the order of `path`."""
         ports = [getattr(at, port) for port in self.frames]
         return list(pairwise(ports))
 
-    def _length(self, at: Any) -> SX:
+    def _length(self, at: At) -> SX:
         """Return the length of the path [m]: sum of the distances of successive points."""
         return sum((a.to(b).length for a, b in self._segments(at)), SX(0))
 
@@ -66,14 +66,21 @@ class RopeOverPulleys(_Rope):
         length: length of the rope [m].
     """
 
-    def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return {"length": length of the path minus length of the rope [m]}."""
+    def rows(self, at: At) -> Mapping[str, Row | SX]:
+        """Return {"length": length of the path minus length of the rope [m]}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"length": self._length(at) - at.length}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"tension": constraint force along the rope [N]}.
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"tension": constraint force along the rope [N]}, positive if it pulls.
 
-        Positive values pull the points together. It is negative where a real rope would be slack.
+        It is negative where a real rope would be slack.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {"tension": -at.lam["length"]}
 
@@ -102,10 +109,13 @@ class ElasticRope(_Rope):
     damping = custom.parameter("N.s/m", 0.0, min=0)
     width = custom.parameter("m", _TAUT, positive=True)
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
+    def loads(self, at: At) -> Mapping[str, Load]:
         """Return the force ON each point by "p0", "p1", ...: the tension towards each neighbour.
 
         A force is in axes of its own point [N]. All forces are zero while the rope is slack.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         T = self._tension(at)
         total: dict[str, FrameLoad] = {}
@@ -116,37 +126,47 @@ class ElasticRope(_Rope):
                 total[port] = FrameLoad(force, load.moment, own_axes=True)
         return total
 
-    def energy(self, at: Any) -> SX:
-        """Return the energy of the stretched rope [J]; zero while the rope is slack."""
+    def energy(self, at: At) -> SX:
+        """Return the energy of the stretched rope [J]; zero while the rope is slack.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(at.stiffness * self._stretch(at)[2])
 
-    def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by the damper [W]; zero while the rope is slack."""
+    def dissipation(self, at: At) -> SX:
+        """Return the power dissipated by the damper [W]; zero while the rope is slack.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(self._tensions(at)[1] * self._rate(at))
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"tension": tension [N]}, never negative and zero while the rope is slack."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"tension": tension [N]}, never negative and zero while the rope is slack.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"tension": self._tension(at)}
 
-    def _stretch(self, at: Any) -> tuple[SX, SX, SX]:
-        """Return slope, ramp [m] and integral of the ramp [m^2] at the stretch, see `smooth_ramp`.
+    def _stretch(self, at: At) -> tuple[SX, SX, SX]:
+        """Return (slope, ramp [m], integral of the ramp [m^2]) of `smooth_ramp` at the stretch.
 
         All are zero while the rope is slack.
         """
         return smooth_ramp(self._length(at) - at.length, at.width)
 
-    def _rate(self, at: Any) -> SX:
+    def _rate(self, at: At) -> SX:
         """Return the rate of the length of the path [m/s]."""
         return sum((a.to(b).rate for a, b in self._segments(at)), SX(0))
 
-    def _tension(self, at: Any) -> SX:
+    def _tension(self, at: At) -> SX:
         """Return the tension of the spring plus that of the damper [N]."""
         return sum(self._tensions(at), SX(0))
 
-    def _tensions(self, at: Any) -> tuple[SX, SX]:
-        """Return the tensions of the spring and of the damper [N].
-
-        Both zero while the rope is slack.
+    def _tensions(self, at: At) -> tuple[SX, SX]:
+        """Return the tensions of the spring and of the damper [N]; zero while the rope is slack.
 
         The damper tension is negative while the rope shortens, and at most as large as the spring
         tension.

@@ -8,13 +8,12 @@ while it locks. The rigid elements stick and lock at events, in simulations and 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import casadi
 from casadi import SX
 
 from mbs.components import custom
-from mbs.components.custom import Friction, Load, OneWay, Row, Stop
+from mbs.components.custom import At, Friction, Load, OneWay, Row, Stop
 from mbs.components.drives import OneFlange, TwoFlanges
 from mbs.components.forces import one_sided_damping, smooth_ramp
 from mbs.components.joints import smooth_sign
@@ -39,20 +38,28 @@ class _BetweenShafts(TwoFlanges):
 
     torque = custom.output("N.m")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return {"flange_a": -T, "flange_b": T}: torques ON the shafts [N m]; `torque` is T."""
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return {"flange_a": -T, "flange_b": T}: torques ON the shafts [N m]; `torque` is T.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         T = self._torque(at)
         return {"flange_a": -T, "flange_b": T}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"torque": torque that flange_b gets from flange_a [N m]}."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"torque": torque that flange_b gets from flange_a [N m]}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"torque": self._torque(at)}
 
-    def _torque(self, at: Any) -> SX:
+    def _torque(self, at: At) -> SX:
         """Return the torque ON flange_b [N m]; flange_a gets the opposite torque."""
         raise NotImplementedError
 
-    def _slip(self, at: Any) -> SX:
+    def _slip(self, at: At) -> SX:
         """Return the speed of flange_a minus the speed of flange_b [rad/s]."""
         return SX(at.flange_a.speed - at.flange_b.speed)
 
@@ -60,30 +67,49 @@ class _BetweenShafts(TwoFlanges):
 class _SlippingShafts(_BetweenShafts):
     """Base of elements that dissipate all the power of their torque."""
 
-    def dissipation(self, at: Any) -> SX:
-        """Return the torque from a to b times the slip speed w_a - w_b [W]."""
+    def dissipation(self, at: At) -> SX:
+        """Return the torque from a to b times the slip speed w_a - w_b [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(self._torque(at) * self._slip(at))
 
 
-class _BrakingTorque(OneFlange):
-    """Base of elements that brake one shaft and dissipate all the power."""
+class BrakingForce(OneFlange):
+    """Base of elements that brake one shaft or sliding part and dissipate all the power.
 
-    torque = custom.output("N.m")
+    A subclass declares one output: the braking torque or force.
+    """
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return {"flange": -T}: torque ON the shaft [N m], opposed to its speed."""
-        return {"flange": -self._torque(at)}
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return {"flange": -T}: torque or force ON the flange [N m or N], opposed to its speed.
 
-    def dissipation(self, at: Any) -> SX:
-        """Return the braking torque times the speed of the shaft [W]."""
-        return SX(self._torque(at) * at.flange.speed)
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
+        return {"flange": -self._effort(at)}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"torque": T [N m]}, with the sign of the speed. The shaft gets -T."""
-        return {"torque": self._torque(at)}
+    def dissipation(self, at: At) -> SX:
+        """Return the braking torque or force T times the speed of the flange [W].
 
-    def _torque(self, at: Any) -> SX:
-        """Return the braking torque [N m], with the sign of the speed of the shaft."""
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
+        return SX(self._effort(at) * at.flange.speed)
+
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return the braking torque or force T [N m or N], by the name of the output.
+
+        It has the sign of the speed. The flange gets -T.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
+        return {self.output_names[0]: self._effort(at)}
+
+    def _effort(self, at: At) -> SX:
+        """Return the braking torque or force T [N m or N], with the sign of the speed."""
         raise NotImplementedError
 
 
@@ -110,27 +136,40 @@ class ShaftSpringDamperSeries(_BetweenShafts):
     twist = custom.state("rad")
     parallel = custom.parameter("N.m/rad", 0.0, min=0)
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"twist": dz/dt [rad/s]}, the damper torque divided by `damping`."""
+    def rates(self, at: At) -> Mapping[str, SX]:
+        """Return {"twist": dz/dt [rad/s]}, the damper torque divided by `damping`.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"twist": self._damper_torque(at) / at.damping}
 
-    def energy(self, at: Any) -> SX:
-        """Return the energy of both springs, stiffness (x - z)^2 / 2 + parallel z^2 / 2 [J]."""
+    def energy(self, at: At) -> SX:
+        """Return the energy of both springs, stiffness (x - z)^2 / 2 + parallel z^2 / 2 [J].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(0.5 * (at.stiffness * self._stretch(at) ** 2 + at.parallel * at.twist**2))
 
-    def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by the damper, damper torque^2 / damping [W]."""
+    def dissipation(self, at: At) -> SX:
+        """Return the power dissipated by the damper, damper torque^2 / damping [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(self._damper_torque(at) ** 2 / at.damping)
 
-    def _damper_torque(self, at: Any) -> SX:
+    def _damper_torque(self, at: At) -> SX:
         """Return the damper torque T - parallel z [N m], from the balance at the massless node."""
         return SX(self._torque(at) - at.parallel * at.twist)
 
-    def _stretch(self, at: Any) -> SX:
+    def _stretch(self, at: At) -> SX:
         """Return the twist x - z of the series spring [rad]."""
         return SX(at.flange_a.angle - at.flange_b.angle - at.twist)
 
-    def _torque(self, at: Any) -> SX:
+    def _torque(self, at: At) -> SX:
+        """Return the torque T = stiffness (x - z) from a to b [N m]."""
         return SX(at.stiffness * self._stretch(at))
 
 
@@ -157,30 +196,40 @@ class ElastoBacklash(_BetweenShafts):
     damping = custom.parameter("N.m.s/rad", 0.0, min=0)
     width = custom.parameter("rad", _FLANK, positive=True)
 
-    def energy(self, at: Any) -> SX:
-        """Return the energy of the flanks in contact [J]; zero within the backlash."""
+    def energy(self, at: At) -> SX:
+        """Return the energy of the flanks in contact [J]; zero within the backlash.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(
-            at.stiffness * sum((smooth_ramp(d, at.width)[2] for _, d in self._sides(at)), SX(0))
+            at.stiffness
+            * sum((smooth_ramp(d, at.width)[2] for _, d in self._flank_depths(at)), SX(0))
         )
 
-    def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by the damper [W]; zero within the backlash."""
+    def dissipation(self, at: At) -> SX:
+        """Return the power dissipated by the damper [W]; zero within the backlash.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(self._torques(at)[1] * self._slip(at))
 
-    def _torque(self, at: Any) -> SX:
+    def _torque(self, at: At) -> SX:
+        """Return the torque of spring and damper from a to b [N m]."""
         return sum(self._torques(at), SX(0))
 
-    def _torques(self, at: Any) -> tuple[SX, SX]:
+    def _torques(self, at: At) -> tuple[SX, SX]:
         """Return the torques of spring and damper from a to b [N m], zero within the backlash."""
         elastic, damped = SX(0), SX(0)
-        for sign, depth in self._sides(at):
+        for sign, depth in self._flank_depths(at):
             slope, ramped, _ = smooth_ramp(depth, at.width)
             spring = at.stiffness * ramped
             elastic += sign * spring
             damped += one_sided_damping(at.damping * slope * self._slip(at), spring)
         return elastic, damped
 
-    def _sides(self, at: Any) -> list[tuple[float, SX]]:
+    def _flank_depths(self, at: At) -> list[tuple[float, SX]]:
         """Return (sign of the torque, depth beyond the backlash [rad]) of both flanks.
 
         The depth is negative if the flank is not in contact.
@@ -213,15 +262,22 @@ class PlanetaryGear(custom.Custom):
     torque_ring = custom.output("N.m")
     torque_carrier = custom.output("N.m")
 
-    def rows(self, at: Any) -> Mapping[str, Row | SX]:
-        """Return {"mesh": angle_sun + ratio angle_ring - (1 + ratio) angle_carrier [rad]}."""
+    def rows(self, at: At) -> Mapping[str, Row | SX]:
+        """Return {"mesh": angle_sun + ratio angle_ring - (1 + ratio) angle_carrier [rad]}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         value = at.sun.angle + at.ratio * at.ring.angle - (1 + at.ratio) * at.carrier.angle
         return {"mesh": Row(value, "1")}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the constraint torques ON the shafts [N m].
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return the constraint torques ON the three shafts [N m].
 
-        Names: torque_sun, torque_ring, torque_carrier.
+        They are named torque_sun, torque_ring and torque_carrier.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         T = at.lam["mesh"]
         return {
@@ -274,40 +330,56 @@ class LossyGear(TwoFlanges):
                 " revolution of flange_b, less than zero where they rotate in opposite directions"
             )
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the torques ON the shafts [N m]: "flange_b": T, "flange_a": -T (1 + e) / ratio."""
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return the torques ON the shafts [N m]: "flange_b": T, "flange_a": -T (1 + e) / ratio.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         T = self._torque(at)
         return {"flange_a": -T * (1 + self._losses(at)) / at.ratio, "flange_b": T}
 
-    def energy(self, at: Any) -> SX:
-        """Return stiffness x^2 / 2 of the twist x at flange_b [J]."""
+    def energy(self, at: At) -> SX:
+        """Return stiffness x^2 / 2 of the twist x at flange_b [J].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(0.5 * at.stiffness * self._twist(at) ** 2)
 
-    def dissipation(self, at: Any) -> SX:
-        """Return the power lost in the damper and in the mesh [W]."""
+    def dissipation(self, at: At) -> SX:
+        """Return the power lost in the damper and in the mesh [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(at.damping * self._rate(at) ** 2 + self._loss(at))
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return "torque": T ON flange_b [N m], and "loss": power lost in the mesh only [W]."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return "torque": T ON flange_b [N m], and "loss": power lost in the mesh only [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"torque": self._torque(at), "loss": self._loss(at)}
 
-    def _twist(self, at: Any) -> SX:
+    def _twist(self, at: At) -> SX:
         """Return the twist x = angle_a / ratio - angle_b [rad]."""
         return SX(at.flange_a.angle / at.ratio - at.flange_b.angle)
 
-    def _rate(self, at: Any) -> SX:
+    def _rate(self, at: At) -> SX:
         """Return the rate of the twist x [rad/s]."""
         return SX(at.flange_a.speed / at.ratio - at.flange_b.speed)
 
-    def _torque(self, at: Any) -> SX:
+    def _torque(self, at: At) -> SX:
         """Return T, the torque ON flange_b [N m]."""
         return SX(at.stiffness * self._twist(at) + at.damping * self._rate(at))
 
-    def _loss(self, at: Any) -> SX:
+    def _loss(self, at: At) -> SX:
         """Return the power lost in the mesh [W], never negative."""
         return SX(self._torque(at) * self._losses(at) * at.flange_a.speed / at.ratio)
 
-    def _losses(self, at: Any) -> SX:
+    def _losses(self, at: At) -> SX:
         """Return the loss e of the class docstring: lost power as a fraction of T w."""
         w = at.flange_a.speed / at.ratio
         s = casadi.tanh(w / at.width) * casadi.tanh(self._torque(at) / at.torque_width)
@@ -319,7 +391,7 @@ class LossyGear(TwoFlanges):
 # Loads, brakes and clutches.
 
 
-class QuadraticSpeedTorque(_BrakingTorque):
+class QuadraticSpeedTorque(BrakingForce):
     """Load of a fan, a propeller or a pump: torque -coefficient |w| w at the shaft speed w.
 
     Source: Modelica Association 2023.
@@ -329,13 +401,15 @@ class QuadraticSpeedTorque(_BrakingTorque):
     """
 
     coefficient = custom.parameter("N.m.s2/rad2", min=0)
+    torque = custom.output("N.m")
 
-    def _torque(self, at: Any) -> SX:
+    def _effort(self, at: At) -> SX:
+        """Return coefficient abs(w) w [N m] at the shaft speed w."""
         w = at.flange.speed
         return SX(at.coefficient * casadi.fabs(w) * w)
 
 
-class Brake(_BrakingTorque):
+class Brake(BrakingForce):
     """A brake between a shaft and the housing: torque -capacity engagement tanh(w / width).
 
     The input `engagement` is the fraction of the normal force, from 0 for a released brake
@@ -352,8 +426,10 @@ class Brake(_BrakingTorque):
     capacity = custom.parameter("N.m", min=0)
     width = custom.parameter("rad/s", _CREEP, positive=True)
     engagement = custom.input()
+    torque = custom.output("N.m")
 
-    def _torque(self, at: Any) -> SX:
+    def _effort(self, at: At) -> SX:
+        """Return the smooth friction torque of the brake [N m], with the sign of the speed."""
         return friction_of(at, at.flange.speed)
 
 
@@ -375,14 +451,21 @@ class Clutch(_SlippingShafts):
     width = custom.parameter("rad/s", _CREEP, positive=True)
     engagement = custom.input()
 
-    def _torque(self, at: Any) -> SX:
+    def _torque(self, at: At) -> SX:
+        """Return the smooth friction torque from a to b [N m], with the sign of the slip speed."""
         return friction_of(at, self._slip(at))
 
 
-def friction_of(at: Any, w: SX) -> SX:
-    """Return the smooth Coulomb friction [N m or N] of a brake or clutch, with the sign of w.
+def friction_of(at: At, w: SX) -> SX:
+    """Return the smooth Coulomb friction of a brake or clutch [N m or N].
 
-    `w` is the slip speed [rad/s or m/s]. The size is capacity max(engagement, 0) tanh(|w| / width).
+    Its sign is that of the slip velocity w.
+
+    Its size is capacity max(engagement, 0) tanh(abs(w) / width).
+
+    Args:
+        at: values of capacity, engagement and width of the component.
+        w: (1, 1) slip velocity [rad/s or m/s].
     """
     return SX(at.capacity * casadi.fmax(at.engagement, 0) * smooth_sign(w, at.width))
 
@@ -404,7 +487,8 @@ class OneWayClutch(_SlippingShafts):
     damping = custom.parameter("N.m.s/rad", positive=True)
     width = custom.parameter("rad/s", _CREEP, positive=True)
 
-    def _torque(self, at: Any) -> SX:
+    def _torque(self, at: At) -> SX:
+        """Return the torque from a to b [N m], zero while b is faster."""
         return SX(at.damping * smooth_ramp(self._slip(at), at.width)[1])
 
 
@@ -429,10 +513,13 @@ class RigidBrake(OneFlange):
     sticking = custom.parameter("1", 1.0, min=1)
     engagement = custom.input()
 
-    def frictions(self, at: Any) -> Mapping[str, Friction]:
-        """Return {"": Friction} whose slip is the speed of the shaft [rad/s].
+    def frictions(self, at: At) -> Mapping[str, Friction]:
+        """Return {"": Friction} whose slip is the speed of the flange [rad/s or m/s].
 
         Its limit is capacity times max(engagement, 0).
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {"": capacity_of(at, at.flange.speed)}
 
@@ -456,19 +543,26 @@ class RigidClutch(TwoFlanges):
     sticking = custom.parameter("1", 1.0, min=1)
     engagement = custom.input()
 
-    def frictions(self, at: Any) -> Mapping[str, Friction]:
+    def frictions(self, at: At) -> Mapping[str, Friction]:
         """Return {"": Friction} whose slip is the speed of flange_b minus that of flange_a [rad/s].
 
         Its effort is the torque ON flange_b [N m].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {"": capacity_of(at, at.flange_b.speed - at.flange_a.speed)}
 
 
-def capacity_of(at: Any, slip: SX) -> Friction:
+def capacity_of(at: At, slip: SX) -> Friction:
     """Return the Coulomb friction with sticking of a brake or clutch.
 
     The sliding limit is capacity times max(engagement, 0), the sticking limit `sticking` times
-    that. `slip` is the slip velocity [rad/s or m/s].
+    that.
+
+    Args:
+        at: values of capacity, engagement and sticking of the component.
+        slip: (1, 1) slip velocity [rad/s or m/s].
     """
     sliding = at.capacity * casadi.fmax(at.engagement, 0)
     return Friction(slip, sliding, at.sticking * sliding)
@@ -483,6 +577,10 @@ class RigidOneWayClutch(TwoFlanges):
     Source: Pfeiffer and Glocker 1996, chapters 4 and 6.
     """
 
-    def stops(self, at: Any) -> Mapping[str, Stop | OneWay]:
-        """Return {"": OneWay}: the speed of flange_b minus that of flange_a stays at least zero."""
+    def stops(self, at: At) -> Mapping[str, Stop | OneWay]:
+        """Return {"": OneWay}: the speed of flange_b minus that of flange_a stays at least zero.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"": OneWay(at.flange_b.speed - at.flange_a.speed)}

@@ -67,17 +67,11 @@ class Sensor(OnPoints):
 
     @property
     def measured(self) -> tuple[Quantity, ...]:
-        """Measured quantities in the order of the readings.
+        """Measured quantities, in the order of the readings.
 
-        Empty for a joint sensor: the assembly determines its quantities from the coordinate.
+        Empty for a joint sensor, whose quantities depend on the type of the coordinate.
         """
         raise NotImplementedError
-
-    def _check_axes(self, allowed: tuple[str, ...], meaning: str) -> None:
-        """Raise DescriptionError, with the advice `meaning`, if `axes` is not allowed."""
-        axes = getattr(self, "axes", None)
-        if axes not in allowed:
-            raise DescriptionError(f"{self.name}: axes is {quoted(axes)}; use {meaning}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +85,10 @@ class MotionSensor(Sensor):
         return tuple(quantity for quantity in _MOTION if quantity.name in names)
 
     def _check_quantities(self) -> None:
-        """Replace None by all quantities; raise DescriptionError for unknown names."""
+        """Replace the field `quantities` by a tuple of names, in place; None becomes all names.
+
+        Raise DescriptionError for unknown names.
+        """
         given = getattr(self, "quantities", None)
         known = [quantity.name for quantity in _MOTION]
         if given is None:
@@ -131,14 +128,12 @@ class AbsoluteSensor(MotionSensor):
     def __post_init__(self) -> None:
         Component.__post_init__(self)
         self._take_point("point")
-        self._check_axes(
-            ("world", "body"), "'world', or 'body' for those of the point, which rotate with it"
-        )
+        self._require_axes()
         self._check_quantities()
 
     @property
     def points(self) -> tuple[Point, ...]:
-        """Tuple with the measured point only."""
+        """The measured point, as a tuple."""
         return (self.point,)
 
 
@@ -162,7 +157,7 @@ class RelativeSensor(OnPair, MotionSensor):
 
     def __post_init__(self) -> None:
         OnPair.__post_init__(self)
-        self._check_axes(("a", "b", "world"), "'a', 'b' or 'world'")
+        self._require_axes(("a", "b", "world"), "'a', 'b' or 'world'")
         self._check_quantities()
 
 
@@ -206,7 +201,11 @@ class OnJoint(Sensor):
             )
 
     def scoped(self: S, prefix: str) -> S:
-        """Return a copy whose name and joint have the prefix "`prefix`."."""
+        """Return a copy whose name and joint have the prefix "`prefix`.".
+
+        Args:
+            prefix: text before the names, without the dot.
+        """
         return replace(Component.scoped(self, prefix), joint=f"{prefix}.{self.joint}")
 
 
@@ -246,7 +245,7 @@ class WrenchSensor(OnJoint):
 
     def __post_init__(self) -> None:
         OnJoint.__post_init__(self)
-        self._check_axes(("a", "b", "world"), "'a', 'b' or 'world'")
+        self._require_axes(("a", "b", "world"), "'a', 'b' or 'world'")
 
     @property
     def measured(self) -> tuple[Quantity, ...]:

@@ -78,7 +78,7 @@ class Shape:
             )
 
     def _is_possible(self, size: tuple[float, ...]) -> bool:
-        """Return whether `size` has the number of lengths of its kind, all of them in range."""
+        """Return whether `size` has the number of lengths for `kind`, all of them in range."""
         expected = {"sphere": 1, "cylinder": 2, "capsule": 2}.get(self.kind, 3)
         if len(size) != expected or not all(map(math.isfinite, size)):
             return False
@@ -90,12 +90,12 @@ class Shape:
 
 
 def is_mesh_file(name: str) -> bool:
-    """Return whether a file has the ending of a mesh format that can be drawn."""
+    """Return whether a file name has the ending of a mesh format that can be drawn."""
     return name.lower().endswith(_MESH_KINDS)
 
 
 def _numbers(values: Any) -> tuple[float, ...]:
-    """Return the numbers in a value; an empty tuple if it is not numeric."""
+    """Return the numbers in a value as a tuple; empty if it is not numeric."""
     try:
         return tuple(float(value) for value in np.ravel(np.asarray(values, dtype=float)))
     except (TypeError, ValueError):

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from mbs.components import custom
 from mbs.components.blocks import SignalBlock
-from mbs.components.custom import Custom, Event
+from mbs.components.custom import At, Custom, Event
 from mbs.errors import DescriptionError
 from mbs.text import did_you_mean, quoted
 
@@ -42,13 +42,17 @@ class SignalSource(SignalBlock):
     clock = custom.state("s")
     y = custom.output()
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"clock": 1}: one second per second."""
+    def rates(self, at: At) -> Mapping[str, SX]:
+        """Return {"clock": 1}: one second per second.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"clock": SX(1)}
 
 
-def _held(begun: SX, signal: SX) -> SX:
-    """Return `signal` if `begun`, the time since its start, is at least zero; else zero."""
+def _zero_before_start(begun: SX, signal: SX) -> SX:
+    """Return `signal` if `begun`, the time since its start [s], is at least zero; else zero."""
     return casadi.if_else(begun >= 0, signal, 0)
 
 
@@ -68,12 +72,20 @@ class Step(SignalSource):
     start_time = custom.parameter("s", 0.0)
     offset = custom.parameter("1", 0.0)
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": offset, plus height from start_time on}."""
-        return {"y": at.offset + _held(at.clock - at.start_time, at.height)}
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"y": offset, plus height from start_time on}.
 
-    def crossings(self, at: Any) -> Mapping[str, SX]:
-        """Return {"start": time since start_time [s]}, the event indicator of the step."""
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
+        return {"y": at.offset + _zero_before_start(at.clock - at.start_time, at.height)}
+
+    def crossings(self, at: At) -> Mapping[str, SX]:
+        """Return {"start": time since start_time [s]}, the event indicator of the step.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"start": at.clock - at.start_time}
 
 
@@ -92,13 +104,21 @@ class Ramp(SignalSource):
     start_time = custom.parameter("s", 0.0)
     offset = custom.parameter("1", 0.0)
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": ramp of the class docstring}, constant before and after the rise."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"y": ramp of the class docstring}, constant before and after the rise.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         part = (at.clock - at.start_time) / at.duration
         return {"y": at.offset + at.height * casadi.fmin(casadi.fmax(part, 0), 1)}
 
-    def crossings(self, at: Any) -> Mapping[str, SX]:
-        """Return the times since the start ("start") and the end ("end") of the rise [s]."""
+    def crossings(self, at: At) -> Mapping[str, SX]:
+        """Return the times since the start ("start") and the end ("end") of the rise [s].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         begun = at.clock - at.start_time
         return {"start": begun, "end": begun - at.duration}
 
@@ -122,17 +142,28 @@ class Sine(SignalSource):
     start_time = custom.parameter("s", 0.0)
     offset = custom.parameter("1", 0.0)
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": value of the class equation; offset before start_time}."""
-        begun = at.clock - at.start_time
-        return {"y": at.offset + _held(begun, self._wave(at, begun))}
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"y": value of the class equation; offset before start_time}.
 
-    def _wave(self, at: Any, begun: SX) -> SX:
-        """Return the deviation of y from the offset at the time `begun` since start_time [s]."""
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
+        begun = at.clock - at.start_time
+        return {"y": at.offset + _zero_before_start(begun, self._wave(at, begun))}
+
+    def _wave(self, at: At, begun: SX) -> SX:
+        """Return the deviation of y from the offset.
+
+        `begun` is the time since start_time [s].
+        """
         return SX(at.amplitude * casadi.sin(2 * math.pi * at.frequency * begun + at.phase))
 
-    def crossings(self, at: Any) -> Mapping[str, SX]:
-        """Return {"start": time since start_time [s]}."""
+    def crossings(self, at: At) -> Mapping[str, SX]:
+        """Return {"start": time since start_time [s]}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"start": at.clock - at.start_time}
 
 
@@ -146,7 +177,11 @@ class ExpSine(Sine):
 
     damping = custom.parameter("1/s", 1.0)
 
-    def _wave(self, at: Any, begun: SX) -> SX:
+    def _wave(self, at: At, begun: SX) -> SX:
+        """Return the damped deviation of y from the offset.
+
+        `begun` is the time since start_time [s].
+        """
         # fmax keeps exp from overflowing before the begin, where the value is not used
         return SX(Sine._wave(self, at, begun) * casadi.exp(-at.damping * casadi.fmax(begun, 0)))
 
@@ -179,7 +214,7 @@ class KinematicPTP(SignalSource):
 
     def __post_init__(self) -> None:
         Custom.__post_init__(self)
-        shortest, given = self.shortest_duration, self._number("duration")
+        shortest, given = self.shortest_duration, self._parameter_value("duration")
         # a duration that was computed from other numbers may be shorter by rounding
         if shortest is not None and given is not None and given < shortest * (1 - 1e-9):
             raise DescriptionError(
@@ -190,22 +225,25 @@ class KinematicPTP(SignalSource):
     @property
     def shortest_duration(self) -> float | None:
         """Shortest duration that the limits allow [s]; None if one of the numbers is a symbol."""
-        found = [self._number(name) for name in ("begin", "end", "v_max", "a_max")]
+        found = [self._parameter_value(name) for name in ("begin", "end", "v_max", "a_max")]
         known = [SX(value) for value in found if value is not None]
         if len(known) < len(found):
             return None
         times = _ptp_times(*known)
         return float(casadi.evalf(times[-1]))
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return position "y", its rate "v" and the rate "a" of v.
 
         Before the motion y is `begin`, after it `end`; v and a are then zero.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         rise, brake, last = _ptp_times(at.begin, at.end, at.v_max, at.a_max)
-        slower, distance = self._slower(at, last), casadi.fabs(at.end - at.begin)
+        slowdown, distance = self._slowdown(at, last), casadi.fabs(at.end - at.begin)
         sign = casadi.if_else(at.end < at.begin, -1, 1)
-        s = casadi.fmin(casadi.fmax((at.clock - at.start_time) / slower, 0), last)
+        s = casadi.fmin(casadi.fmax((at.clock - at.start_time) / slowdown, 0), last)
         left, peak = last - s, at.a_max * rise
         phases = (
             (s < rise, (at.a_max * s**2 / 2, at.a_max * s, at.a_max)),
@@ -215,27 +253,34 @@ class KinematicPTP(SignalSource):
         for holds, values in reversed(phases):
             found = [casadi.if_else(holds, *pair) for pair in zip(values, found, strict=True)]
         begun = at.clock - at.start_time
-        moving = casadi.logic_and(begun >= 0, begun < slower * last)
+        moving = casadi.logic_and(begun >= 0, begun < slowdown * last)
         return {
             "y": at.begin + sign * found[0],
-            "v": sign * found[1] / slower,
-            "a": casadi.if_else(moving, sign * found[2] / slower**2, 0),
+            "v": sign * found[1] / slowdown,
+            "a": casadi.if_else(moving, sign * found[2] / slowdown**2, 0),
         }
 
-    def crossings(self, at: Any) -> Mapping[str, SX]:
+    def crossings(self, at: At) -> Mapping[str, SX]:
         """Return the times since "start", "rise", "brake" and "end" [s], where a jumps.
 
         "rise" is the end of the acceleration, "brake" the begin of the braking.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         times = _ptp_times(at.begin, at.end, at.v_max, at.a_max)
-        slower, begun = self._slower(at, times[-1]), at.clock - at.start_time
+        slowdown, begun = self._slowdown(at, times[-1]), at.clock - at.start_time
         after = {
-            n: begun - slower * t for n, t in zip(("rise", "brake", "end"), times, strict=True)
+            n: begun - slowdown * t for n, t in zip(("rise", "brake", "end"), times, strict=True)
         }
         return {"start": begun, **after}
 
-    def _slower(self, at: Any, shortest: SX) -> SX:
-        """Return `duration` divided by the shortest duration; 1 without duration or distance."""
+    def _slowdown(self, at: At, shortest: SX) -> SX:
+        """Return the factor by which the given duration slows down the fastest motion.
+
+        It is `duration` divided by `shortest`, the shortest duration [s]; 1 without duration or
+        distance.
+        """
         if at.duration is None:
             return SX(1)
         return casadi.if_else(
@@ -244,9 +289,10 @@ class KinematicPTP(SignalSource):
 
 
 def _ptp_times(begin: SX, end: SX, v_max: SX, a_max: SX) -> tuple[SX, SX, SX]:
-    """Return the end of the acceleration, begin of the braking and end of the motion [s].
+    """Return the ends of acceleration and of constant speed, and the end of the motion [s].
 
-    All are times since the start of the fastest motion.
+    They are times since the start of the fastest motion from `begin` to `end`, with the limits
+    `v_max` and `a_max`.
     """
     distance = casadi.fabs(end - begin)
     rise = casadi.fmin(v_max / a_max, casadi.sqrt(distance / a_max))
@@ -273,47 +319,64 @@ class PeriodicSource(SignalSource):
     number = custom.mode(-1.0)
     entered = custom.mode()
 
-    def _durations(self, at: Any) -> list[SX]:
+    def _durations(self, at: At) -> list[SX]:
         """Return the duration of each phase of a period [s]."""
         raise NotImplementedError
 
-    def _level(self, at: Any, since: SX) -> list[SX]:
-        """Return the height in each phase by the amplitude, `since` seconds after its start."""
+    def _level(self, at: At, since: SX) -> list[SX]:
+        """Return the height in each phase, divided by the amplitude.
+
+        `since` is the time since the start of the phase [s].
+        """
         raise NotImplementedError
 
     def _require_count(self) -> None:
         """Raise DescriptionError if `count` is a number that is negative or not whole."""
-        count = self._number("count")
+        count = self._parameter_value("count")
         if count is not None and (count < 0 or count != int(count)):
             raise DescriptionError(
                 f"{self.name}: count is {count:g}; give a whole number of periods, or leave it out"
             )
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return {"y": offset, plus amplitude times the height of the present phase}.
 
         It is the offset before start_time and after the last period.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         level = self._level(at, at.clock - at.entered)
         height = sum((casadi.if_else(at.phase == k, h, 0) for k, h in enumerate(level)), SX(0))
         return {
-            "y": at.offset + casadi.if_else(self._runs(at, at.number), at.amplitude * height, 0)
+            "y": at.offset
+            + casadi.if_else(self._has_period(at, at.number), at.amplitude * height, 0)
         }
 
-    def _runs(self, at: Any, number: SX) -> SX:
-        """Return whether the period of index `number` exists: 0 <= number < count."""
+    def _has_period(self, at: At, number: SX) -> SX:
+        """Return whether the period of index `number` exists: 0 <= number < count.
+
+        Without a count there is no upper limit.
+        """
         begun = number >= 0
         return begun if at.count is None else casadi.logic_and(begun, number < at.count)
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"clock": 1, "left": -1}; the rate of `left` is zero after the last period."""
+    def rates(self, at: At) -> Mapping[str, SX]:
+        """Return {"clock": 1, "left": -1}; the rate of `left` is zero after the last period.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         over = SX(0) if at.count is None else at.number >= at.count
         return {**SignalSource.rates(self, at), "left": casadi.if_else(over, 0, -1)}
 
-    def events(self, at: Any) -> Mapping[str, Event]:
+    def events(self, at: At) -> Mapping[str, Event]:
         """Return the event "switches" at left = 0, which sets phase, number, left and entered.
 
         It starts the next phase. The first event, at the first time, finds the phase of that time.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         durations = self._durations(at)
         period = sum(durations, SX(0))
@@ -330,7 +393,7 @@ class PeriodicSource(SignalSource):
         begin = {
             "phase": casadi.if_else(late, last, phase),
             "number": casadi.if_else(late, -1, number),
-            "left": casadi.if_else(late, -begun, _at(durations, phase) + entered - within),
+            "left": casadi.if_else(late, -begun, _element_at(durations, phase) + entered - within),
             "entered": at.clock - casadi.if_else(late, 0, within - entered),
         }
         # all others
@@ -341,7 +404,7 @@ class PeriodicSource(SignalSource):
             "phase": next_phase,
             "number": counted,
             # after the last period the time to the next event stays at some positive value
-            "left": casadi.if_else(over, period, _at(durations, next_phase)),
+            "left": casadi.if_else(over, period, _element_at(durations, next_phase)),
             "entered": at.clock,
         }
         return {
@@ -351,7 +414,7 @@ class PeriodicSource(SignalSource):
         }
 
 
-def _at(values: Sequence[SX], index: SX) -> SX:
+def _element_at(values: Sequence[SX], index: SX) -> SX:
     """Return the element of `values` at `index`, an expression; zero if it is out of range."""
     return sum((casadi.if_else(index == k, value, 0) for k, value in enumerate(values)), SX(0))
 
@@ -379,10 +442,12 @@ class Pulse(PeriodicSource):
         Custom.__post_init__(self)
         self._require_count()
 
-    def _durations(self, at: Any) -> list[SX]:
+    def _durations(self, at: At) -> list[SX]:
+        """Return the durations of the pulse and of the rest of a period [s]."""
         return [SX(at.duty * at.period), SX((1 - at.duty) * at.period)]
 
-    def _level(self, at: Any, since: SX) -> list[SX]:
+    def _level(self, at: At, since: SX) -> list[SX]:
+        """Return the heights of a pulse (1) and of the rest of a period (0)."""
         return [SX(1), SX(0)]
 
 
@@ -412,7 +477,7 @@ class Trapezoid(PeriodicSource):
     def __post_init__(self) -> None:
         Custom.__post_init__(self)
         self._require_count()
-        found = [self._number(name) for name in ("period", "rising", "width", "falling")]
+        found = [self._parameter_value(name) for name in ("period", "rising", "width", "falling")]
         period, *parts = (value if value is not None else 0.0 for value in found)
         # the sum of decimal fractions may exceed the period by rounding
         if found[0] is not None and sum(parts) > period * (1 + 1e-12):
@@ -421,11 +486,16 @@ class Trapezoid(PeriodicSource):
                 f" is {period:g} s; give a longer period or shorter parts"
             )
 
-    def _durations(self, at: Any) -> list[SX]:
+    def _durations(self, at: At) -> list[SX]:
+        """Return the durations of rise, full height, fall and rest of a period [s]."""
         rest = casadi.fmax(at.period - at.rising - at.width - at.falling, 0)
         return [at.rising, at.width, at.falling, rest]
 
-    def _level(self, at: Any, since: SX) -> list[SX]:
+    def _level(self, at: At, since: SX) -> list[SX]:
+        """Return the heights in rise, full height, fall and rest, from 0 to 1.
+
+        `since` is the time since the start of the phase [s].
+        """
         rise, fall = (since / casadi.if_else(t > 0, t, 1) for t in (at.rising, at.falling))
         return [rise, SX(1), 1 - fall, SX(0)]
 
@@ -536,7 +606,7 @@ class Table(SignalSource):
         smoothness: str = "linear",
         extrapolation: str = "hold",
     ) -> Table:
-        """Table of two columns of a file of comma-separated values.
+        """Return the table of two columns of a file of comma-separated values.
 
         Commas, semicolons and tabs separate columns. A first line without numbers has the names of
         the columns. Empty lines and lines that begin with # are skipped.
@@ -573,7 +643,9 @@ class Table(SignalSource):
         return table
 
     def _intervals(self) -> tuple[Array, Array]:
-        """Return starts (n + 1,) [s] of intervals and their polynomials (n + 1, 4), c0 first.
+        """Return the starts [s] of all intervals, and their cubic polynomials with c0 first.
+
+        They are (n + 1,) and (n + 1, 4) for n points.
 
         The first interval is before the table, and its polynomial starts at the first time. The
         last interval is after the table. The n - 1 others are between successive points.
@@ -597,21 +669,32 @@ class Table(SignalSource):
         every = np.vstack([outside[:1], inner, outside[1:]])
         return np.concatenate([begins[:1], begins, t[-1:]]), every
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"clock": 1, "left": -1}; the rate of `left` is zero after the table."""
+    def rates(self, at: At) -> Mapping[str, SX]:
+        """Return {"clock": 1, "left": -1}; the rate of `left` is zero after the table.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         last = len(self._intervals()[0]) - 1
         return {**SignalSource.rates(self, at), "left": casadi.if_else(at.row == last, 0, -1)}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"y": polynomial of the present interval at the clock}."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"y": polynomial of the present interval at the clock}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         s = at.clock - at.knot
         return {"y": at.c0 + s * (at.c1 + s * (at.c2 + s * at.c3))}
 
-    def events(self, at: Any) -> Mapping[str, Event]:
+    def events(self, at: At) -> Mapping[str, Event]:
         """Return the event "next" at left = 0, which sets left, row, knot and c0 .. c3.
 
         It starts the next interval. The first event, at the first time, finds the interval of that
         time.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         begins, polynomials = self._intervals()
         last, span = len(begins) - 1, begins[-1] - begins[0]
@@ -637,14 +720,18 @@ class Table(SignalSource):
 
 
 def _rows_at(table: Array, row: SX) -> list[SX]:
-    """Return the elements of row `row`, an expression, of a numeric table."""
+    """Return the elements of a row of a numeric table; `row`, its index, is an expression."""
     picked = casadi.vertcat(*(row == k for k in range(len(table))))
     found = casadi.mtimes(picked.T, DM(table))
     return [found[k] for k in range(table.shape[1])]
 
 
 def _cubics(name: str, smoothness: str, t: Array, y: Array) -> Array:
-    """Return (n, 4) coefficients of the cubic between successive points, c0 first."""
+    """Return the coefficients (n - 1, 4) of the cubics between n points (t, y), c0 first.
+
+    `smoothness` is "akima" or "monotone". Raise DescriptionError, with the component `name`, if
+    scipy is missing.
+    """
     try:
         from scipy.interpolate import Akima1DInterpolator, PchipInterpolator
     except ImportError:
@@ -658,7 +745,10 @@ def _cubics(name: str, smoothness: str, t: Array, y: Array) -> Array:
 
 
 def _csv_rows(name: str, path: Path) -> list[tuple[int, list[str]]]:
-    """Return (line number from 1, cells) of each line that is neither empty nor a comment."""
+    """Return (line number from 1, cells) of each line of a file, without empty lines and comments.
+
+    Raise DescriptionError, with the component `name`, if it cannot be read or has no rows.
+    """
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -673,7 +763,11 @@ def _csv_rows(name: str, path: Path) -> list[tuple[int, list[str]]]:
 
 
 def _csv_column(name: str, path: str | Path, given: str | int, names: list[str], count: int) -> int:
-    """Return the index of the column `given`, a name or an index; raise if it does not exist."""
+    """Return the index of a column; raise DescriptionError if it does not exist.
+
+    `given` is its name in `names` or its index below `count`; `name` is the component in the
+    message.
+    """
     if isinstance(given, str):
         if given in names:
             return names.index(given)
@@ -687,7 +781,7 @@ def _csv_column(name: str, path: str | Path, given: str | int, names: list[str],
 
 
 def _is_number(cell: str) -> bool:
-    """Return whether a cell is a finite number."""
+    """Return whether the text of a cell is a finite number."""
     try:
         return math.isfinite(float(cell))
     except ValueError:
@@ -720,16 +814,24 @@ class ReferenceFilter(SignalBlock):
     v = custom.output()
     a = custom.output()
 
-    def rates(self, at: Any) -> Mapping[str, SX]:
-        """Return {"x": w, "w": acceleration [1/s2]}."""
+    def rates(self, at: At) -> Mapping[str, SX]:
+        """Return {"x": w, "w": acceleration [1/s2]}.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"x": at.w, "w": self._acceleration(at)}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return the filtered position "q", its rate "v" and the rate "a" of v."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return the filtered position "q", its rate "v" and the rate "a" of v.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"q": at.x, "v": at.w, "a": self._acceleration(at)}
 
-    def _acceleration(self, at: Any) -> SX:
-        """Return the rate of w that the filter sets for the input u [1/s2]."""
+    def _acceleration(self, at: At) -> SX:
+        """Return the acceleration of the filtered position for the input u [1/s2]."""
         w = 2 * math.pi * at.frequency
         # Bessel filter of order 2: 1 / (1 + 1.3617 s/w + 0.6180 (s/w)^2), -3 dB at w
         return SX((w * (at.u - at.x) - 1.3617 * at.w) * w / 0.6180)

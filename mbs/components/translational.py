@@ -8,15 +8,14 @@ to a sliding part.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from casadi import SX
 
 from mbs.components import custom
-from mbs.components.custom import Friction, Load
-from mbs.components.drives import OneFlange, RigidPart, TwoFlanges
+from mbs.components.custom import At, Load
+from mbs.components.drives import RigidPart, TwoFlanges
 from mbs.components.forces import one_sided_damping, smooth_ramp
-from mbs.components.rotational import capacity_of, friction_of
+from mbs.components.rotational import BrakingForce, RigidBrake, friction_of
 from mbs.expressions import Expression, expression
 
 _TOUCH = 1e-4
@@ -45,30 +44,41 @@ class SlidingMass(RigidPart):
 
 
 class _BetweenSlides(TwoFlanges):
-    """Base of elements that pull two flanges together, functions of x = position_b - position_a."""
+    """Base of elements that pull two flanges together.
+
+    Their tension is a function of x = position_b - position_a and its rate.
+    """
 
     flange_a = custom.flange(slides=True)
     flange_b = custom.flange(slides=True)
     force = custom.output("N")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return the forces ON the flanges [N]: "flange_a": tension, "flange_b": -tension."""
+    def loads(self, at: At) -> Mapping[str, Load]:
+        """Return the forces ON the flanges [N]: "flange_a": tension, "flange_b": -tension.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         F = self._tension(at)
         return {"flange_a": F, "flange_b": -F}
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"force": tension [N]}, negative if the flanges are pushed apart."""
+    def outputs(self, at: At) -> Mapping[str, SX]:
+        """Return {"force": tension [N]}, negative if the flanges are pushed apart.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return {"force": self._tension(at)}
 
-    def _tension(self, at: Any) -> SX:
+    def _tension(self, at: At) -> SX:
         """Return the tension [N] that pulls the flanges together; negative if it pushes."""
         raise NotImplementedError
 
-    def _extent(self, at: Any) -> SX:
+    def _extent(self, at: At) -> SX:
         """Return x = position_b - position_a [m]."""
         return SX(at.flange_b.position - at.flange_a.position)
 
-    def _rate(self, at: Any) -> SX:
+    def _rate(self, at: At) -> SX:
         """Return dx/dt, the speed of flange_b minus that of flange_a [m/s]."""
         return SX(at.flange_b.speed - at.flange_a.speed)
 
@@ -92,15 +102,24 @@ class SlidingSpring(_BetweenSlides):
         TwoFlanges.__post_init__(self)
         self._require_effect("stiffness", "damping")
 
-    def energy(self, at: Any) -> SX:
-        """Return stiffness (x - length)^2 / 2 [J]."""
+    def energy(self, at: At) -> SX:
+        """Return stiffness (x - length)^2 / 2 [J].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(0.5 * at.stiffness * (self._extent(at) - at.length) ** 2)
 
-    def dissipation(self, at: Any) -> SX:
-        """Return damping (dx/dt)^2 [W]."""
+    def dissipation(self, at: At) -> SX:
+        """Return damping (dx/dt)^2 [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(at.damping * self._rate(at) ** 2)
 
-    def _tension(self, at: Any) -> SX:
+    def _tension(self, at: At) -> SX:
+        """Return stiffness (x - length) + damping dx/dt [N]; negative if it pushes."""
         stretch = self._extent(at) - at.length
         return SX(at.stiffness * stretch + at.damping * self._rate(at))
 
@@ -114,11 +133,16 @@ class SlidingDamper(_BetweenSlides):
 
     damping = custom.parameter("N.s/m", min=0)
 
-    def dissipation(self, at: Any) -> SX:
-        """Return damping (dx/dt)^2 [W]."""
+    def dissipation(self, at: At) -> SX:
+        """Return damping (dx/dt)^2 [W].
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(at.damping * self._rate(at) ** 2)
 
-    def _tension(self, at: Any) -> SX:
+    def _tension(self, at: At) -> SX:
+        """Return damping dx/dt [N]; positive if the flanges move apart."""
         return SX(at.damping * self._rate(at))
 
 
@@ -145,18 +169,27 @@ class ElastoGap(_BetweenSlides):
     damping = custom.parameter("N.s/m", 0.0, min=0)
     width = custom.parameter("m", _TOUCH, positive=True)
 
-    def energy(self, at: Any) -> SX:
-        """Return the energy of the contact spring [J]; zero without contact."""
+    def energy(self, at: At) -> SX:
+        """Return the energy of the contact spring [J]; zero without contact.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(at.stiffness * self._contact(at)[2])
 
-    def dissipation(self, at: Any) -> SX:
-        """Return the power dissipated by the damper [W]; zero without contact."""
+    def dissipation(self, at: At) -> SX:
+        """Return the power dissipated by the damper [W]; zero without contact.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
+        """
         return SX(self._tensions(at)[1] * self._rate(at))
 
-    def _tension(self, at: Any) -> SX:
+    def _tension(self, at: At) -> SX:
+        """Return the tension of spring and damper [N], never positive."""
         return sum(self._tensions(at), SX(0))
 
-    def _tensions(self, at: Any) -> tuple[SX, SX]:
+    def _tensions(self, at: At) -> tuple[SX, SX]:
         """Return the tensions of spring and damper [N]; both zero without contact.
 
         The tension of the spring is negative in contact: the spring pushes the parts apart.
@@ -165,15 +198,15 @@ class ElastoGap(_BetweenSlides):
         spring = at.stiffness * ramped
         return -spring, one_sided_damping(at.damping * slope * self._rate(at), spring)
 
-    def _contact(self, at: Any) -> tuple[SX, SX, SX]:
-        """Return slope, ramp [m] and integral of the ramp [m^2] at the depth, see `smooth_ramp`.
+    def _contact(self, at: At) -> tuple[SX, SX, SX]:
+        """Return (slope, ramp [m], integral of the ramp [m^2]) of `smooth_ramp` at the depth.
 
         All are zero without contact.
         """
         return smooth_ramp(at.length - self._extent(at), at.width)
 
 
-class SlidingBrake(OneFlange):
+class SlidingBrake(BrakingForce):
     """A brake between a sliding part and its rail: force -capacity engagement tanh(v / width).
 
     The input `engagement` is the fraction of the normal force, from 0 for a released brake
@@ -193,24 +226,12 @@ class SlidingBrake(OneFlange):
     engagement = custom.input()
     force = custom.output("N")
 
-    def loads(self, at: Any) -> Mapping[str, Load]:
-        """Return {"flange": -F}: force ON the part [N], opposed to its speed."""
-        return {"flange": -self._force(at)}
-
-    def dissipation(self, at: Any) -> SX:
-        """Return the braking force times the speed of the part [W]."""
-        return SX(self._force(at) * at.flange.speed)
-
-    def outputs(self, at: Any) -> Mapping[str, SX]:
-        """Return {"force": F [N]}, with the sign of the speed. The part gets -F."""
-        return {"force": self._force(at)}
-
-    def _force(self, at: Any) -> SX:
-        """Return the braking force F [N], with the sign of the speed."""
+    def _effort(self, at: At) -> SX:
+        """Return the smooth friction force of the brake [N], with the sign of the speed."""
         return friction_of(at, at.flange.speed)
 
 
-class RigidSlidingBrake(OneFlange):
+class RigidSlidingBrake(RigidBrake):
     """A brake with sticking between a sliding part and its rail, as a `RigidBrake` on a shaft.
 
     Source: Pfeiffer and Glocker 1996, chapter 5.
@@ -222,12 +243,3 @@ class RigidSlidingBrake(OneFlange):
 
     flange = custom.flange(slides=True)
     capacity = custom.parameter("N", min=0)
-    sticking = custom.parameter("1", 1.0, min=1)
-    engagement = custom.input()
-
-    def frictions(self, at: Any) -> Mapping[str, Friction]:
-        """Return {"": Friction} whose slip is the speed of the part [m/s].
-
-        Its limit is capacity times max(engagement, 0).
-        """
-        return {"": capacity_of(at, at.flange.speed)}

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import casadi
 from casadi import SX
 
 from mbs.components import custom
-from mbs.components.custom import Custom, Row
+from mbs.components.custom import At, Custom, Row
 
 
 class WheelSet(Custom):
@@ -48,27 +47,34 @@ class WheelSet(Custom):
     force_lateral = custom.output("N")
     force_normal = custom.output("N")
 
-    def rows(self, at: Any) -> Mapping[str, Row | SX]:
+    def rows(self, at: At) -> Mapping[str, Row | SX]:
         """Return the position rows "height" [m] and "level".
 
         "height" is the height of the axle centre above the plane less the radius. "level" is the
         cosine between the axle and the normal of the plane.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         motion = at.ground.to(at.axle)
         return {"height": motion.p[2] - at.radius, "level": Row(motion.R[2, 1], "1")}
 
-    def positive(self, at: Any) -> Mapping[str, SX]:
-        """Return {"upright".
+    def positive(self, at: At) -> Mapping[str, SX]:
+        """Return {"upright": cosine of the z axes of `axle` and `ground`}, to be positive.
 
-        Cosine of the z axes of `axle` and `ground`}, which must be positive.
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {"upright": at.ground.to(at.axle).R[2, 2]}
 
-    def velocity_rows(self, at: Any) -> Mapping[str, SX]:
+    def velocity_rows(self, at: At) -> Mapping[str, SX]:
         """Return slip velocities [m/s]: "lateral" along the axle, "left" and "right" ahead.
 
         "left" and "right" are the velocities of the lowest point of each wheel in the direction of
         travel.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         motion = at.ground.to(at.axle)
         axle = motion.R[:, 1]
@@ -81,10 +87,13 @@ class WheelSet(Custom):
             "right": speed + turn - at.radius * (spin + at.right.v),
         }
 
-    def outputs(self, at: Any) -> Mapping[str, SX]:
+    def outputs(self, at: At) -> Mapping[str, SX]:
         """Return the forces of the ground ON the wheels [N].
 
         Names: force_left, force_right (in the direction of travel), force_lateral, force_normal.
+
+        Args:
+            at: values of the component and motion of its ports, see `custom.At`.
         """
         return {
             "force_left": at.lam["left"],

@@ -26,7 +26,12 @@ _ROUNDING = 4e-16
 
 
 def apply_float(operator: str, values: list[float]) -> float:
-    """Return the value of an operator or function on numbers; NaN if it is undefined."""
+    """Return the value of an operator or function on numbers; NaN if it is undefined.
+
+    Args:
+        operator: "+", "-", "*", "/", "^", "negate", or a function in FUNCTIONS.
+        values: values of the one or two operands.
+    """
     try:
         with np.errstate(all="ignore"):
             result = arithmetic(operator, [np.float64(v) for v in values])
@@ -40,7 +45,10 @@ def apply_float(operator: str, values: list[float]) -> float:
 
 
 def arithmetic(operator: str, values: list[Any]) -> Any:
-    """Return the value of an operator; None for a function."""
+    """Return the result of an operator on values of any type with arithmetic; None for a function.
+
+    `operator` is "+", "-", "*", "/", "^" or "negate"; `values` are its one or two operands.
+    """
     first, *rest = values
     match operator:
         case "+":
@@ -143,7 +151,13 @@ class Number(Expression):
 
 
 def out_of_bounds(value: float, low: float | None, high: float | None) -> str:
-    """Return advice for a value out of bounds, as the end of an error message; else empty."""
+    """Return advice such as "give 2 or less" for a value out of bounds; empty if it is within them.
+
+    Args:
+        value: value to check. NaN counts as out of bounds.
+        low: smallest valid value, or None.
+        high: largest valid value, or None.
+    """
     if low is not None and not value >= low:
         least = "more than zero" if low == MORE_THAN_ZERO else f"{low:g} or more"
         return f"give {'zero or more' if low == 0 else least}"
@@ -203,7 +217,13 @@ class Parameter(Expression):
 
 @dataclass(frozen=True, slots=True)
 class Operation(Expression):
-    """Operator or function applied to expressions."""
+    """Operator or function applied to expressions.
+
+    Attributes:
+        operator: "+", "-", "*", "/", "^", "negate", or a function in FUNCTIONS.
+        arguments: one or two operands.
+        depth: length of the longest chain of nested operations, at most 200.
+    """
 
     operator: str
     arguments: tuple[Expression, ...]
@@ -246,7 +266,18 @@ def expression(value: Scalar, where: str = "value") -> Expression:
 
 
 def operation(operator: str, *operands: Scalar) -> Expression:
-    """Apply an operator or function; if all operands are numbers, it is evaluated immediately."""
+    """Apply an operator or function to operands.
+
+    Args:
+        operator: "+", "-", "*", "/", "^", "negate", or a function in FUNCTIONS.
+        operands: its one or two operands.
+
+    Returns:
+        the operation; its value as a `Number` if all operands are numbers.
+
+    Raises:
+        ExpressionError: the value is not finite, or operations are nested more than 200 deep.
+    """
     arguments = tuple(expression(operand) for operand in operands)
     if all(isinstance(argument, Number) for argument in arguments):
         result = apply_float(operator, [a.value for a in arguments])  # type: ignore[attr-defined]
@@ -259,7 +290,15 @@ def operation(operator: str, *operands: Scalar) -> Expression:
 
 
 def finite(value: object, where: str) -> float:
-    """Return a finite value as a float, also from a 0-dimensional array or 1x1 DM; else raise."""
+    """Return a finite value as a float, also from a 0-dimensional array or a 1 x 1 DM.
+
+    Args:
+        value: value as the user wrote it.
+        where: component and field, for the error message.
+
+    Raises:
+        ExpressionError: the value is not a number, not finite, or True or False.
+    """
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     elif isinstance(value, DM) and value.is_scalar():
@@ -278,6 +317,10 @@ def finite(value: object, where: str) -> float:
 
 
 def _text(value: Expression, outer: int = 0) -> str:
+    """Return the text of an expression, in brackets if it binds weaker than the level `outer`.
+
+    Levels are those of `_PRECEDENCE`; 0 never adds brackets.
+    """
     if isinstance(value, Number):
         text = repr(value.value)
         text = text.removesuffix(".0")
@@ -308,7 +351,11 @@ _DEEPEST_NESTING = 100
 
 @lru_cache(maxsize=4096)
 def parse(text: str) -> Expression:
-    """Parse a text to an expression."""
+    """Parse a text of the grammar to an expression, with parameters for its symbols.
+
+    Raises:
+        ExpressionError: the text is not in the grammar, or is nested too deeply.
+    """
     parser = _Parser(text)
     value = parser.sum()
     if parser.token is not None:
@@ -317,7 +364,7 @@ def parse(text: str) -> Expression:
 
 
 class _Parser:
-    """Parser of a text with one token of lookahead."""
+    """Recursive-descent parser of a text with one token of lookahead, `token`."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -328,6 +375,10 @@ class _Parser:
         self.advance()
 
     def _tokens(self) -> Iterator[tuple[str, str]]:
+        """Yield (kind, text) of each token.
+
+        Kind is "number", "name" or "mark" (an operator or bracket).
+        """
         position, text = 0, self.text.rstrip()
         while position < len(text):
             match = TOKEN.match(text, position)
@@ -337,15 +388,18 @@ class _Parser:
             position = match.end()
 
     def fail(self, reason: str) -> NoReturn:
+        """Raise ExpressionError with the text and the reason."""
         raise ExpressionError(
             f"cannot read {quoted(self.text)}: {reason}; write numbers, symbols, + - * / ^,"
             " sin, cos, tan, sqrt, atan2 and pi"
         )
 
     def advance(self) -> None:
+        """Read the next token into `kind` and `token`; both are None at the end."""
         self.kind, self.token = next(self.tokens, (None, None))
 
     def accept(self, *marks: str) -> str | None:
+        """Read past the current token and return it if it is one of `marks`; else return None."""
         if self.kind == "mark" and self.token in marks:
             mark = self.token
             self.advance()
@@ -353,15 +407,18 @@ class _Parser:
         return None
 
     def expect(self, mark: str) -> None:
+        """Read past the operator or bracket `mark`; raise ExpressionError if it is not there."""
         if not self.accept(mark):
             self.fail(f"{mark!r} is missing")
 
     def deeper(self) -> None:
+        """Count one more level of nesting; raise ExpressionError beyond 100 levels."""
         self.depth += 1
         if self.depth > _DEEPEST_NESTING:
             self.fail("it is nested too deeply")
 
     def sum(self) -> Expression:
+        """Parse the rule `sum` of the grammar: products joined by + and -."""
         self.deeper()
         value = self.product()
         while mark := self.accept("+", "-"):
@@ -370,12 +427,14 @@ class _Parser:
         return value
 
     def product(self) -> Expression:
+        """Parse the rule `product` of the grammar: unary terms joined by * and /."""
         value = self.unary()
         while mark := self.accept("*", "/"):
             value = operation(mark, value, self.unary())
         return value
 
     def unary(self) -> Expression:
+        """Parse the rule `unary` of the grammar: a power with any number of signs."""
         negative = False
         while mark := self.accept("-", "+"):
             negative ^= mark == "-"
@@ -383,6 +442,7 @@ class _Parser:
         return -value if negative else value
 
     def power(self) -> Expression:
+        """Parse the rule `power` of the grammar: an atom, with an optional exponent."""
         base = self.atom()
         if not self.accept("^", "**"):
             return base
@@ -392,6 +452,7 @@ class _Parser:
         return operation("^", base, exponent)
 
     def atom(self) -> Expression:
+        """Parse the rule `atom` of the grammar: a number, a name, a function call, or brackets."""
         kind, token = self.kind, self.token
         if kind is None or token is None:
             self.fail("it ends too early")
@@ -407,6 +468,7 @@ class _Parser:
         return self._named(token)
 
     def _named(self, name: str) -> Expression:
+        """Return the constant, the parameter or the function call that starts with `name`."""
         if name in CONSTANTS:
             return Number(CONSTANTS[name])
         if not self.accept("("):
@@ -433,7 +495,11 @@ T = TypeVar("T")
 
 
 def parameters_of(value: Expression) -> Iterator[Parameter]:
-    """Yield the parameters of an expression in the order of the text, including repetitions."""
+    """Yield the parameters of an expression in the order of the text, including repetitions.
+
+    Args:
+        value: expression.
+    """
     if isinstance(value, Parameter):
         yield value
     elif isinstance(value, Operation):
@@ -442,7 +508,12 @@ def parameters_of(value: Expression) -> Iterator[Parameter]:
 
 
 def renamed(value: Expression, prefix: str) -> Expression:
-    """Return the expression with a prefix on every parameter name: L2 becomes prefix.L2."""
+    """Return the expression with a prefix on every parameter name: `L2` becomes `prefix.L2`.
+
+    Args:
+        value: expression.
+        prefix: text before the names, without the dot.
+    """
     if isinstance(value, Parameter):
         return replace(value, name=f"{prefix}.{value.name}")
     if isinstance(value, Operation):
@@ -451,7 +522,11 @@ def renamed(value: Expression, prefix: str) -> Expression:
 
 
 def without_defaults(value: Expression) -> Expression:
-    """Return the expression with parameters that have no default value."""
+    """Return the expression with parameters that have no default value.
+
+    Args:
+        value: expression.
+    """
     if isinstance(value, Parameter):
         return replace(value, default=None)
     if isinstance(value, Operation):
@@ -460,9 +535,13 @@ def without_defaults(value: Expression) -> Expression:
 
 
 def with_values(value: Expression, values: Mapping[str, float]) -> Expression:
-    """Return the expression with numbers instead of parameters with known values.
+    """Return the expression with numbers in place of the parameters with known values.
 
     The default of a parameter is its value if `values` does not contain it.
+
+    Args:
+        value: expression.
+        values: value by parameter name. Parameters without value and default remain.
 
     Raises:
         ExpressionError: the expression has no finite value.
@@ -476,14 +555,26 @@ def with_values(value: Expression, values: Mapping[str, float]) -> Expression:
 
 
 def to_sx(value: Scalar, symbols: Mapping[str, SX]) -> SX:
-    """Return the expression in CasADi symbols, by parameter name."""
+    """Return a number, text or expression as a CasADi expression.
+
+    Args:
+        value: number, text or expression.
+        symbols: CasADi scalar of each parameter, by parameter name.
+
+    Raises:
+        KeyError: a parameter is not in `symbols`.
+    """
     return _fold(expression(value), SX, lambda p: symbols[p.name], _apply_sx)
 
 
 def to_float(value: Scalar, values: Mapping[str, float] | None = None) -> float | None:
-    """Return the value of an expression, with parameters from `values` or by default.
+    """Return the value of a number, text or expression.
 
     None if a parameter has no value, or if the result is not finite, such as 1/A with A = 0.
+
+    Args:
+        value: number, text or expression.
+        values: value by parameter name; the default of a parameter is used if it is not contained.
     """
     known = values or {}
 
@@ -501,6 +592,11 @@ def _fold(
     symbol: Callable[[Parameter], T],
     apply: Callable[[str, list[T]], T],
 ) -> T:
+    """Evaluate an expression bottom-up in a type T.
+
+    `number` converts numbers, `symbol` converts parameters, and `apply` evaluates an operator (by
+    its name) on operands of the type T.
+    """
     if isinstance(value, Number):
         return number(value.value)
     if isinstance(value, Parameter):
@@ -510,6 +606,7 @@ def _fold(
 
 
 def _apply_sx(operator: str, values: list[SX]) -> SX:
+    """Return the result of an operator or function, by its name, on CasADi scalars."""
     result = arithmetic(operator, values)
     return SX(getattr(casadi, operator)(*values) if result is None else result)
 
@@ -543,7 +640,16 @@ def number(value: Scalar, where: str) -> float:
 
 
 def whole_number(value: Scalar, where: str) -> int:
-    """Return the integer that a text or an expression is; arguments and errors as for `number`."""
+    """Return the value of a whole number, of its text, or of an expression with known symbols.
+
+    Args:
+        value: number, text or expression as the user wrote it.
+        where: name of the file, field or option, for the error message.
+
+    Raises:
+        ExpressionError: the text is not in the grammar, a symbol has no value, or the value is not
+            whole.
+    """
     found = _find(value, where)
     if found is None or not found.is_integer():
         raise ExpressionError(f"{where}: {_given(value)} is not a whole number; write one")
@@ -551,10 +657,15 @@ def whole_number(value: Scalar, where: str) -> int:
 
 
 def _find(value: Scalar, where: str) -> float | None:
+    """Return the value; None for True, False, unknown symbols and values that are not finite.
+
+    `where` is named in the message of the ExpressionError that a wrong text raises.
+    """
     return None if isinstance(value, bool) else to_float(expression(value, where))
 
 
 def _given(value: Scalar) -> str:
+    """Return the text of the value for error messages, in quotation marks."""
     return quoted(str(value) if isinstance(value, Expression) else value)
 
 

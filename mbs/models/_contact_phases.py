@@ -59,23 +59,23 @@ class ContactPhases:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the points."""
+        """Names of the contact points, in the order of the columns of forces."""
         return tuple(point.name for point in self.points)
 
     def accelerations(self, touching: Touching = ()) -> Function:
-        """Forward dynamics in a phase: ``phase(q, v, tau) -> a, f, lam``.
+        """Return the forward dynamics in a phase: ``phase(q, v, tau) -> a, f, lam``.
 
         Solves A a + H = tau + J_f' f + J' lam, with zero acceleration of the touching points in
-        their constrained directions. Drift is not corrected. Redundant points, for instance at
-        the four corners of a foot, share their forces.
+        their constrained directions. Drift is not corrected. Redundant points, for instance at the
+        four corners of a foot, share their forces.
 
         Args:
             touching: names of the touching points, or a dict from name to "fixed" or "sliding".
 
         Returns:
             Function of q (nq, 1), v and tau (nv, 1); accelerations a (nv, 1), plane forces f (3, n)
-            and, for a closed system, loop efforts lam (r, 1), as in
-            `direct_dynamics(system, coordinates="tree")`.
+            and, for a closed system, loop efforts lam (r, 1), as in `direct_dynamics(system,
+            coordinates="tree")`.
 
         Raises:
             ModelError: a point or its mode is unknown.
@@ -94,7 +94,9 @@ class ContactPhases:
         return model_function(self.system, ("phase", self.points, modes), build)
 
     def residuals(self, touching: Touching = ()) -> Function:
-        """Implicit equations: ``phase_residuals(q, v, a, tau, f, lam) -> motion, contact, loops``.
+        """Return the implicit equations of motion in a phase.
+
+        They are ``phase_residuals(q, v, a, tau, f, lam) -> motion, contact, loops``.
 
         The residuals are zero in the phase. They are the equations of `accelerations`, unsolved,
         with as many rows as a, f and lam have elements.
@@ -105,8 +107,8 @@ class ContactPhases:
         Returns:
             Function of q, v, a, tau, f and, for a closed system, lam. Outputs: motion (nv, 1),
             residual joint efforts [N m or N]; contact (3, n), point acceleration in constrained
-            directions [m/s^2] and force in free directions [N]; for a closed system also loops
-            (r, 1), J a + dJ/dt v.
+            directions [m/s^2] and force in free directions [N]; for a closed system also loops (r,
+            1), J a + dJ/dt v.
 
         Raises:
             ModelError: a point or its mode is unknown.
@@ -134,11 +136,11 @@ class ContactPhases:
         return model_function(self.system, ("phase_residuals", self.points, modes), build)
 
     def impact(self, touching: Touching) -> Function:
-        """Velocities after an inelastic impact: ``touchdown(q, v) -> v_plus, P``.
+        """Return the velocities after an inelastic impact: ``touchdown(q, v) -> v_plus, P``.
 
         Solves A (v_plus - v) = J_f' P + J' Lambda. After the impact the touching points have no
-        velocity in their constrained directions (no rebound), and loops stay closed. Leave out
-        of `touching` each point that lifts off in this impact, so that no impulse pulls it.
+        velocity in their constrained directions (no rebound), and loops stay closed. Leave out of
+        `touching` each point that lifts off in this impact, so that no impulse pulls it.
 
         Args:
             touching: names of the points that touch after the impact, or a dict from name to
@@ -163,7 +165,7 @@ class ContactPhases:
         return model_function(self.system, ("touchdown", self.points, modes), build)
 
     def motion(self) -> Function:
-        """Positions and velocities of the points, in any phase: ``points(q, v) -> r, V``.
+        """Return positions and velocities of the points, in any phase: ``points(q, v) -> r, V``.
 
         Returns:
             Function of q (nq, 1) and v (nv, 1); positions r (3, n) in the frames of the planes [m]
@@ -180,7 +182,7 @@ class ContactPhases:
         return model_function(self.system, ("points", self.points), build)
 
     def friction(self, sides: int | None = None) -> Function:
-        """Friction cone margins: ``cone(f) -> margin``.
+        """Return the friction cone margins: ``cone(f) -> margin``.
 
         All elements are zero or positive if no contact force pulls and no point slips. For each
         point: f_z and, if the point has a friction coefficient mu, mu^2 f_z^2 - f_x^2 - f_y^2. This
@@ -209,7 +211,7 @@ class ContactPhases:
         tau0: Values = None,
         parameters: Mapping[str, float] | None = None,
     ) -> PhaseDae:
-        """Differential-algebraic equations of a phase, with rows for contacts and loops.
+        """Return the differential-algebraic equations of a phase, with rows for contacts and loops.
 
         x = [q; v] in every form. "reduced" solves for the accelerations and has no z. The other
         forms are as in `mbs.models.dae`, with contact forces in lam. The distance of a touching
@@ -236,17 +238,23 @@ class ContactPhases:
         return phase_dae(Standing(self.system, self.points, modes), explicit, form, begin)
 
     def _loops(self, name: str, value: SX) -> Named:
-        """Named input or output for a closed system; empty list for an open system."""
+        """Return a list with the input or output `name` for a closed system.
+
+        Empty for an open one.
+        """
         return [(name, value)] if self.system.is_closed else []
 
     def _modes(self, touching: Touching) -> tuple[str, ...]:
-        """Mode of each point: "fixed", "sliding" or "" if it is free."""
+        """Return the mode of each point: "fixed", "sliding" or "" if it is free.
+
+        Raise ModelError if a point or a mode in `touching` is unknown.
+        """
         return modes_of(self.system.name, self.points, touching)
 
     def _solve_constrained(
         self, s: ModelSymbols, rows: PointRows, modes: tuple[str, ...], right: tuple[SX, SX, SX]
     ) -> tuple[SX, SX, SX]:
-        """Solve A x = b + J_f' y + J' z, J_f x = d, J x = e for x, y and z.
+        """Return the solution (x, y, z) of A x = b + J_f' y + J' z, J_f x = d, J x = e.
 
         A is the mass matrix, J_f the constrained rows of the points, J the closure Jacobian.
 
@@ -307,5 +315,5 @@ def contact_phases(system: System, points: Iterable[ContactPoint]) -> ContactPha
 
 
 def _efforts(system: System, s: ModelSymbols, a: SX) -> SX:
-    """Return the efforts of the tree for accelerations a, without contact forces."""
+    """Return the joint efforts (nv, 1) of the tree for accelerations a, without contact forces."""
     return tree_efforts(system, s, a, surroundings(system))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi
 import numpy as np
@@ -63,16 +63,19 @@ class Rows:
 
     @property
     def deepest(self) -> SX:
-        """(r, 1) residuals of positions, then velocity residuals of nonholonomic rows."""
+        """(r, 1) residuals of position constraints, then velocity residuals of other rows."""
         return casadi.vertcat(self.positions, self.velocities[self.positions.numel() :])
 
     @property
     def J_positions(self) -> SX:
-        """(s, nv) rows of J of the position constraints."""
+        """(s, nv) rows of J that belong to the position constraints."""
         return self.J[: self.positions.numel(), :]
 
     def join(self, other: Rows) -> Rows:
-        """Append the rows of `other`; position constraints of both precede velocity constraints."""
+        """Return the rows followed by those of `other`, position constraints before velocity ones.
+
+        The quaternion norms are those of the first rows.
+        """
         s, t = self.positions.numel(), other.positions.numel()
 
         def both(mine: SX, theirs: SX) -> SX:
@@ -88,7 +91,14 @@ class Rows:
 
 
 def rows_of(system: System, q: SX, v: SX, a: SX) -> Rows:
-    """Independent constraint rows at the symbols q (nq, 1), v (nv, 1) and a (nv, 1)."""
+    """Return the residuals of the independent constraint rows of a system as expressions.
+
+    Args:
+        system: open or closed mechanism.
+        q: (nq, 1) symbols of positions.
+        v: (nv, 1) symbols of velocities.
+        a: (nv, 1) symbols of accelerations.
+    """
     phi, J, drift = SX(0, 1), SX(0, system.nv), None
     if system.is_closed:
         phi, J = independent_closure(system, q), independent_constraint_rows(system, q)
@@ -150,13 +160,20 @@ class DaeEquations:
 
 
 def motors(system: System) -> list[int]:
-    """Indices of the actuated velocities without a device, such as a motor with a drive line."""
+    """Return the indices in v of the actuated velocities that no device drives.
+
+    Devices are components such as a motor with a drive line. The efforts of the others are inputs
+    of the equations.
+
+    Args:
+        system: open or closed mechanism.
+    """
     driven = [device.velocity for device in system.devices]
     return [k for k, s in enumerate(system.speeds) if s.actuated and k not in driven]
 
 
 def implicit(system: System, form: str, constrained: ConstraintRows | None = None) -> DaeEquations:
-    """Equations with x = [q; v] and z = [a; lam] or, in form "ggl", z = [a; lam; mu].
+    """Return the equations with x = [q; v] and z = [a; lam] or, in form "ggl", z = [a; lam; mu].
 
     The equations of a are the inverse dynamics. No mass matrix is built or factorised, so that
     links may be massless.
@@ -164,7 +181,12 @@ def implicit(system: System, form: str, constrained: ConstraintRows | None = Non
     Args:
         system: open or closed mechanism.
         form: "index1", "index2", "index3" or "ggl".
-        constrained: further constraint rows in addition to the loops, such as contact points.
+        constrained: callable (symbols, accelerations) that returns constraint rows in addition to
+            the loops, such as those of contact points; None without them.
+
+    Raises:
+        ModelError: there are further rows, and an input is wired to a measured acceleration or
+            force.
     """
     s = symbols_of(system, "tree")
     q, v, a = s.q, s.v, SX.sym("a", system.nv)
@@ -183,13 +205,15 @@ def implicit(system: System, form: str, constrained: ConstraintRows | None = Non
         system,
         states=(casadi.vertcat(q, v, system.z), casadi.vertcat(a, lam, mu), u),
         ode=casadi.vertcat(position_rate(system.tree, q, speed), a, rates),
-        alg=casadi.vertcat(needed - tau - casadi.mtimes(rows.J.T, lam), _keep(rows, form)),
+        alg=casadi.vertcat(
+            needed - tau - casadi.mtimes(rows.J.T, lam), _kept_residuals(rows, form)
+        ),
         invariants=casadi.vertcat(rows.positions, rows.velocities, rows.norms),
         motion=(q, v),
     )
 
 
-def _keep(rows: Rows, form: str) -> SX:
+def _kept_residuals(rows: Rows, form: str) -> SX:
     """Return the constraint residuals that are algebraic equations in a form of the DAE."""
     match form:
         case "index1":
@@ -202,7 +226,11 @@ def _keep(rows: Rows, form: str) -> SX:
 
 
 def open_chain(system: System) -> DaeEquations:
-    """Equations of an open chain with x = [q; v] and no z, by its forward dynamics."""
+    """Return the equations of an open chain with x = [q; v] and no z, by its forward dynamics.
+
+    Args:
+        system: open mechanism.
+    """
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     u, tau, rates = driving(system, q, v)
     (a,) = outputs_of(system, direct_dynamics(system), q, v, tau)
@@ -217,7 +245,7 @@ def open_chain(system: System) -> DaeEquations:
 
 
 def closed_form(system: System, branch: tuple[str, ...]) -> DaeEquations:
-    """Equations of a system with closed-form loops: x = [q_a; v_a], no z, q = f(q_a).
+    """Return the equations of a system with closed-form loops: x = [q_a; v_a], no z, q = f(q_a).
 
     Args:
         system: closed mechanism; q_a and v_a are its independent positions and velocities.
@@ -241,9 +269,13 @@ def closed_form(system: System, branch: tuple[str, ...]) -> DaeEquations:
 
 
 def carried_positions(system: System) -> DaeEquations:
-    """Equations of a closed system with x = [q; v_a] and no z; phi(q) is an invariant.
+    """Return the equations of a closed system with x = [q; v_a] and no z.
 
-    All positions q are integrated, with the independent velocities v_a only.
+    All positions q are integrated, with the independent velocities v_a only. The closure residual
+    phi(q) is an invariant.
+
+    Args:
+        system: closed mechanism.
     """
     q, v_a = SX.sym("q", system.nq), SX.sym("v_a", len(system.active))
     u, v, a, rates = _independent_motion(system, q, v_a)
@@ -258,11 +290,11 @@ def carried_positions(system: System) -> DaeEquations:
 
 
 def _independent_motion(system: System, q: SX, v_a: SX) -> tuple[SX, SX, SX, SX]:
-    """Motion of a closed system at positions q and independent velocities v_a.
+    """Return the motion of a closed system at positions q and independent velocities v_a.
 
     Returns:
-        input symbols u, tree velocities (nv, 1), independent accelerations, rates of component
-        states.
+        symbols of the inputs u, tree velocities (nv, 1), independent accelerations, rates of
+        component states.
     """
     (G,) = outputs_of(system, reduction_matrix(system), q)
     v = casadi.densify(casadi.mtimes(G, v_a))
@@ -275,7 +307,12 @@ def _independent_motion(system: System, q: SX, v_a: SX) -> tuple[SX, SX, SX, SX]
 
 
 def require_no_later(system: System) -> None:
-    """Raise if an input is wired to a measured acceleration or force, which contacts change.
+    """Raise if a component input is wired to a measured acceleration or force.
+
+    Contacts of phases change these, which the equations do not consider.
+
+    Args:
+        system: open or closed mechanism.
 
     Raises:
         ModelError: the message names the first wire.
@@ -288,7 +325,7 @@ def require_no_later(system: System) -> None:
 
 
 def driving(system: System, q: SX, v: SX, *, resolved: bool = True) -> tuple[SX, SX, SX]:
-    """Input symbols u, joint efforts tau (nv, 1) of motors and devices, rates of component states.
+    """Return symbols of inputs, joint efforts of motors and devices, and rates of component states.
 
     Args:
         system: open or closed mechanism.
@@ -296,6 +333,9 @@ def driving(system: System, q: SX, v: SX, *, resolved: bool = True) -> tuple[SX,
         v: (nv, 1) velocities of the tree.
         resolved: whether sensor signals of accelerations and forces that are wired to inputs are
             replaced by their expressions in the rates.
+
+    Returns:
+        input symbols u, joint efforts tau (nv, 1), and rates (nz, 1) of the component states.
     """
     driven = motors(system)
     u = SX.sym("u", len(driven))
@@ -315,7 +355,7 @@ def equations(
     invariants: SX,
     motion: tuple[SX, SX],
 ) -> DaeEquations:
-    """Assemble DaeEquations from expressions, after common subexpression elimination.
+    """Return DaeEquations from expressions, after common subexpression elimination.
 
     Args:
         system: open or closed mechanism.
@@ -344,13 +384,14 @@ _EFFORT = {"m": "N", "rad": "N.m", "1": "N.m"}
 def elements_of(
     system: System, form: str, standing: tuple[Elements, Elements] = ((), ())
 ) -> Mapping[str, Elements]:
-    """Name and unit of each element of x, z, u, p, alg and invariants of a form.
+    """Return (name, unit) of each element of x, z, u, p, alg and invariants, by these names.
 
     Args:
         system: open or closed mechanism.
         form: "open", "closed form" (x = [q_a; v_a]) or "carried" (x = [q; v_a]) for the three kinds
             of "reduced", "phase" for the explicit contact phase, else as in `mbs.models.dae`.
-        standing: position constraints and velocity constraints of touching contact points.
+        standing: (name, unit) of the position constraints and of the velocity constraints of
+            touching contact points.
     """
     q, v, a, tau = _coordinates(system)
     own = system.states
@@ -365,7 +406,7 @@ def elements_of(
     v_a = tuple(v[k] for k in system.active)
     phi, slips = (a + b for a, b in zip(_rows(system), standing, strict=True))
     rows = phi + slips
-    speeds = _of("der", rows, RATE_UNIT)
+    speeds = _named_rows("der", rows, RATE_UNIT)
     explicit = {
         "open": (q + v, norms),
         "closed form": (tuple(q[k] for k in system.active) + v_a, ()),
@@ -376,23 +417,23 @@ def elements_of(
         x, invariants = explicit[form]
         return {**fixed, "x": x + own, "z": (), "alg": (), "invariants": invariants}
     kept = {
-        "index1": _of("der(der", rows, _RATE_OF_RATE, "))"),
+        "index1": _named_rows("der(der", rows, _RATE_OF_RATE, "))"),
         "index2": speeds,
-        "index3": phi + _of("der", slips, RATE_UNIT),
+        "index3": phi + _named_rows("der", slips, RATE_UNIT),
         "ggl": phi + speeds,
     }[form]
-    mu = _of("mu", phi, dict.fromkeys(RATE_UNIT, "1")) if form == "ggl" else ()
+    mu = _named_rows("mu", phi, dict.fromkeys(RATE_UNIT, "1")) if form == "ggl" else ()
     return {
         **fixed,
         "x": q + v + own,
-        "z": a + _of("lam", rows, _EFFORT) + mu,
+        "z": a + _named_rows("lam", rows, _EFFORT) + mu,
         "alg": tau + kept,
         "invariants": phi + speeds + norms,
     }
 
 
 def _coordinates(system: System) -> tuple[Elements, Elements, Elements, Elements]:
-    """Return the named elements of q, v, a and tau, as in simulation results."""
+    """Return (name, unit) of the elements of q, v, a and tau, as in simulation results."""
     q = tuple((f"{c.name}.q", c.unit) for c in system.coordinates)
     v = tuple((f"{s.name}.v", s.unit) for s in system.speeds)
     a = tuple((f"{s.name}.a", ACCELERATION_UNIT[s.unit]) for s in system.speeds)
@@ -401,9 +442,9 @@ def _coordinates(system: System) -> tuple[Elements, Elements, Elements, Elements
 
 
 def _rows(system: System) -> tuple[Elements, Elements]:
-    """Elements of the independent position and velocity constraints of the loops.
+    """Return (name, unit) of the independent position and velocity constraints of the loops.
 
-    Velocity constraints have the unit of their integral; `_of` applies the unit of its rate.
+    Velocity constraints have the unit of their integral; `_named_rows` applies that of the rate.
     """
     if system.closure is None:
         return (), ()
@@ -420,8 +461,8 @@ def _rows(system: System) -> tuple[Elements, Elements]:
     return tuple(positions[k] for k in kept.rows), tuple(slips[k] for k in kept.slips)
 
 
-def _of(what: str, rows: Elements, unit: Mapping[str, str], end: str = ")") -> Elements:
-    """Return constraint rows with names "what(name)" and converted units.
+def _named_rows(what: str, rows: Elements, unit: Mapping[str, str], end: str = ")") -> Elements:
+    """Return constraint rows (name, unit) with names "what(name)" and converted units.
 
     Args:
         what: prefix of the names.
@@ -446,6 +487,7 @@ class Dae(DaeEquations):
         x0, z0, u0, p0: consistent start as one-dimensional arrays: `alg` and `invariants` are zero.
     """
 
+    _outputs: ClassVar[tuple[str, ...]] = ("ode", "alg", "invariants", "q", "v")
     form: str
     elements: Mapping[str, Elements]
     x0: Array
@@ -462,10 +504,13 @@ class Dae(DaeEquations):
         return {name: getattr(self, name) for name in ("x", "z", "u", "p", "ode", "alg")}
 
     def function(self) -> Function:
-        """Function ``dae(x, z, u, p) -> ode, alg, invariants, q, v`` of numbers, SX or MX."""
-        inputs, outputs = ("x", "z", "u", "p"), ("ode", "alg", "invariants", "q", "v")
-        given, results = ([getattr(self, n) for n in names] for names in (inputs, outputs))
-        return Function("dae", given, results, list(inputs), list(outputs), {"cse": True})
+        """Return the Function ``dae(x, z, u, p) -> ode, alg, invariants, q, v``.
+
+        It accepts numbers, SX or MX.
+        """
+        inputs = ("x", "z", "u", "p")
+        given, results = ([getattr(self, n) for n in names] for names in (inputs, self._outputs))
+        return Function("dae", given, results, list(inputs), list(self._outputs), {"cse": True})
 
 
 def dae(
@@ -480,7 +525,9 @@ def dae(
     parameters: Mapping[str, float] | None = None,
     guess: Guess = None,
 ) -> Dae:
-    """Equations of motion dx/dt = ode, 0 = alg, with the same efforts as in `direct_dynamics`.
+    """Return the equations of motion dx/dt = ode, 0 = alg with a consistent start.
+
+    Efforts are those of `direct_dynamics`. Forms:
 
     - "reduced": explicit equations, no z. Open chains: x = [q; v]. Closed systems with a closed
       form (`mbs.loops.function`): x = [q_a; v_a], the independent joints, on the branch of the
@@ -523,19 +570,13 @@ def dae(
     require_no_contacts(system, "dae")
     if form not in FORMS:
         raise ModelError(f"{system.name}: form is {quoted(form)}; use one of {', '.join(FORMS)}")
-    p = np.array(system.parameter_values(parameters), dtype=float)
-    q0, own = state_of(q0), device_states_of(states)
-    q, v = start(system, q0, v0, parameters, guess)
-    if isinstance(q0, State) and own is None:
-        own = q0.z
-    tau = start_efforts(system, tau0)
-    z = by_name(system, "states", own, system.states, system.z_start)
-    u = by_name(system, "inputs", inputs, system.inputs, system.u_default)
-    kind = _kind(system, form, q, p)
-    equations, elements = _built(system, kind)
+    point = start_values(system, q0, v0, tau0, states, inputs, parameters, guess)
+    q, v, tau, z, u, p = point.values()
+    kind = _kind_of_form(system, form, q, p)
+    equations, elements = _built_equations(system, kind)
     parts = {field.name: getattr(equations, field.name) for field in fields(equations)}
     x0 = np.concatenate([_start_states(system, kind[0], q, v), z])
-    z0 = _start_algebraic(system, (q, v, tau, z, u, p), equations.z.numel())
+    z0 = _start_algebraic(system, tuple(point.values()), equations.z.numel())
     u0 = np.concatenate([tau[motors(system)], u])
     return Dae(**parts, form=form, elements=elements, x0=x0, z0=z0, u0=u0, p0=p)
 
@@ -544,7 +585,7 @@ _Kind = tuple[str, tuple[str, ...]]
 """Form, with "reduced" resolved into "open", "closed form" or "carried", and branch labels."""
 
 
-def _kind(system: System, form: str, q: Array, p: Array) -> _Kind:
+def _kind_of_form(system: System, form: str, q: Array, p: Array) -> _Kind:
     """Return the kind of equations that a requested DAE form needs, and branch labels.
 
     Args:
@@ -559,7 +600,7 @@ def _kind(system: System, form: str, q: Array, p: Array) -> _Kind:
     if not system.is_closed:
         return "open", ()
     slips = bool(system.closure and system.closure.slips)
-    if slips or system.nq != system.nv or _winds(system):
+    if slips or system.nq != system.nv or _angle_turns_matter(system):
         return "carried", ()
     try:
         return "closed form", _branch(system, q, p)
@@ -567,8 +608,8 @@ def _kind(system: System, form: str, q: Array, p: Array) -> _Kind:
         return "carried", ()
 
 
-def _winds(system: System) -> bool:
-    """Whether a full revolution of some passive joint changes efforts or couplings.
+def _angle_turns_matter(system: System) -> bool:
+    """Return whether a full revolution of some passive joint changes efforts or couplings.
 
     Closed forms of loops return angles modulo 2 pi, so that they are not valid then.
     """
@@ -591,10 +632,9 @@ def _winds(system: System) -> bool:
 
 
 def _branch(system: System, q: Array, p: Array) -> tuple[str, ...]:
-    """Branch labels of the closed configuration q.
+    """Return the labels of the assembly branch of the closed configuration q.
 
-    Raises:
-        Unclosable: two branches of a loop meet at q.
+    `p` are the parameters. Raise Unclosable if two branches of a loop meet at q.
     """
     stages = plan(system)
     branches = branches_at(system, stages, q, p)
@@ -607,8 +647,11 @@ def _branch(system: System, q: Array, p: Array) -> tuple[str, ...]:
     return tuple(label for label in labels if label)
 
 
-def _built(system: System, kind: _Kind) -> tuple[DaeEquations, Mapping[str, Elements]]:
-    """Return the equations of a kind from `_kind`, and the named elements of their vectors."""
+def _built_equations(system: System, kind: _Kind) -> tuple[DaeEquations, Mapping[str, Elements]]:
+    """Return the equations of a kind, and (name, unit) of the elements of their vectors.
+
+    `kind` is a result of `_kind_of_form`. The equations are cached.
+    """
 
     def build() -> tuple[DaeEquations, Mapping[str, Elements]]:
         form, branch = kind
@@ -628,7 +671,11 @@ def _built(system: System, kind: _Kind) -> tuple[DaeEquations, Mapping[str, Elem
 
 
 def start_efforts(system: System, tau0: Values) -> Array:
-    """(nv,) joint efforts from values by name.
+    """Return the joint efforts (nv,) for efforts given by name; zero for others.
+
+    Args:
+        system: open or closed mechanism.
+        tau0: efforts of motors by name [N m or N], or None.
 
     Raises:
         ModelError: a joint with a nonzero effort has no motor.
@@ -645,8 +692,52 @@ def start_efforts(system: System, tau0: Values) -> Array:
     return tau
 
 
+def start_values(
+    system: System,
+    q0: Start,
+    v0: Start,
+    tau0: Values,
+    states: Mapping[str, float] | State | Result | None,
+    inputs: Mapping[str, float] | None,
+    parameters: Mapping[str, float] | None,
+    guess: Guess,
+) -> dict[str, Array]:
+    """Return the start of a mechanism as arrays "q", "v", "tau", "z", "u" and "p", in this order.
+
+    These are positions (nq,), velocities (nv,), joint efforts (nv,), component states, component
+    inputs and parameters.
+
+    Args:
+        system: open or closed mechanism.
+        q0: start positions, as in `dae`; a `State` also supplies component states that are not
+            given.
+        v0: start velocities by name; zero by default.
+        tau0: start efforts of motors by name; zero by default.
+        states: start values of component states by name; by default as described.
+        inputs: start values of component inputs by name; by default as described.
+        parameters: values of symbols; other symbols have their defaults.
+        guess: approximate positions of other joints, which select the assembly branch.
+
+    Raises:
+        ModelError: a name is unknown, a joint of tau0 has no motor, or a symbol has no value.
+        Unclosable: the loops cannot be closed at q0.
+    """
+    p = np.array(system.parameter_values(parameters), dtype=float)
+    q0, own = state_of(q0), device_states_of(states)
+    q, v = start(system, q0, v0, parameters, guess)
+    if isinstance(q0, State) and own is None:
+        own = q0.z
+    tau = start_efforts(system, tau0)
+    z = by_name(system, "states", own, system.states, system.z_start)
+    u = by_name(system, "inputs", inputs, system.inputs, system.u_default)
+    return {"q": q, "v": v, "tau": tau, "z": z, "u": u, "p": p}
+
+
 def _start_states(system: System, form: str, q: Array, v: Array) -> Array:
-    """Return initial states from q (nq,) and v (nv,) for a kind of equations from `_kind`."""
+    """Return the initial states of a form from q (nq,) and v (nv,), without component states.
+
+    `form` is the first element of the result of `_kind_of_form`.
+    """
     active = list(system.active)
     if form == "closed form":
         return np.concatenate([q[active], v[active]])
@@ -654,7 +745,7 @@ def _start_states(system: System, form: str, q: Array, v: Array) -> Array:
 
 
 def _start_algebraic(system: System, point: tuple[Array, ...], size: int) -> Array:
-    """Consistent algebraic states: accelerations, efforts of the closure rows, zeros for mu.
+    """Return consistent algebraic states: accelerations, row efforts, and zeros for mu.
 
     Args:
         system: open or closed mechanism.

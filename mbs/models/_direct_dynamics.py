@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import casadi
 import numpy as np
 from casadi import SX, Function
 from numpy.typing import NDArray
@@ -50,7 +49,9 @@ _NO_INERTIA = 1e-30
 
 
 def inertia_matrix(system: System, coordinates: str = "independent") -> Function:
-    """Inertia matrix (mass matrix): ``inertia(q) -> A`` with kinetic energy v' A v / 2.
+    """Return the inertia matrix (mass matrix): ``inertia(q) -> A``.
+
+    The kinetic energy is v' A v / 2.
 
     Source: Walker & Orin 1982; Khalil & Creusot 1997, eq. 27-38; for closed systems G' A G.
 
@@ -79,7 +80,7 @@ def direct_dynamics(
     f_ext: bool = False,
     moving_base: bool = False,
 ) -> Function:
-    """Forward dynamics, accelerations produced by joint efforts: ``ddm(q, v, tau) -> a``.
+    """Return the forward dynamics, accelerations due to joint efforts: ``ddm(q, v, tau) -> a``.
 
     For open chains: articulated bodies, linear in the number of links, or A a = tau - H with the
     composite-body inertia matrix A, factorised without fill-in between branches. For closed
@@ -125,9 +126,16 @@ def direct_dynamics(
 
 
 def independent_dynamics(system: System) -> Function:
-    """Forward dynamics for efforts of the independent joints: ``ddm(q, v_a, tau_a) -> a_a``.
+    """Return the forward dynamics for efforts of the independent joints of a system.
 
-    It equals `direct_dynamics(system)` if the motors are on the independent joints.
+    It is ``ddm(q, v_a, tau_a) -> a_a``, equal to `direct_dynamics(system)` if the motors are on the
+    independent joints.
+
+    Args:
+        system: open or closed mechanism.
+
+    Raises:
+        ModelError: a joint moves no inertia, so that its acceleration is undetermined.
     """
     if system.motors == system.active:
         return direct_dynamics(system)
@@ -165,7 +173,7 @@ def _candidates(system: System) -> tuple[str, ...]:
 
 
 def _composite_may_win(system: System) -> bool:
-    """Whether method "composite" may need fewer operations than articulated bodies.
+    """Return whether method "composite" may need fewer operations than articulated bodies.
 
     The operations to factorise and solve with A are compared to the bound `_ARTICULATED`.
     """
@@ -178,7 +186,10 @@ def _composite_may_win(system: System) -> bool:
 def _model(
     system: System, method: str, coordinates: str, f_ext: bool, moving_base: bool
 ) -> Function:
-    """Build the direct dynamic model by a method; f_ext and moving_base add inputs."""
+    """Return the direct dynamic model by a method, "composite" or "articulated".
+
+    `f_ext` and `moving_base` add inputs.
+    """
     in_tree = coordinates == "tree" and system.is_closed
 
     def build() -> tuple[Named, Named]:
@@ -202,23 +213,32 @@ def _model(
 
 
 def _articulated(system: System, s: ModelSymbols, tau: SX, around: ExternalForces) -> SX:
-    """Return the accelerations of an open chain for efforts tau, by articulated bodies."""
+    """Return the accelerations (nv, 1) of an open chain for efforts tau, by articulated bodies.
+
+    `around` has the base motion and external wrenches.
+    """
     left = tau - own_efforts(system, s, SX.zeros(system.nv))
     external = exerted(system, around, s.poses, s.q, s.v)
     return articulated_accelerations(system.tree, s.poses, s.v, left, around.base, external)
 
 
 def _composite(system: System, s: ModelSymbols, tau: SX, around: ExternalForces) -> SX:
-    """Return the independent accelerations for efforts tau by solving A a = tau - H."""
+    """Return the independent accelerations for efforts tau by solving A a = tau - H.
+
+    `around` has the base motion and external wrenches.
+    """
     A = tree_inertia(system.tree, s.poses)
     H = s.reduced_effort(tree_efforts(system, s, s.tree_acceleration(SX.zeros(s.size)), around))
     return solve_tree(s.reduced_matrix(A), tau - H, solution_order(system, s))
 
 
 def require_inertia(system: System) -> None:
-    """Raise if an independent velocity moves no inertia.
+    """Raise if an independent velocity moves no inertia, so that its acceleration is undetermined.
 
     Systems with a symbol without default are not checked.
+
+    Args:
+        system: open or closed mechanism.
 
     Raises:
         ModelError: the message names the velocity and the remedy.
@@ -227,7 +247,11 @@ def require_inertia(system: System) -> None:
     def check() -> bool:
         if any(p.default is None for p in system.parameters):
             return True
-        loose = _loose_in_loops(system) if system.is_closed else _loose_in_tree(system)
+        loose = (
+            _without_inertia_in_loops(system)
+            if system.is_closed
+            else _without_inertia_in_tree(system)
+        )
         if loose is not None:
             number = system.active[loose]
             name = system.speeds[number].name
@@ -241,21 +265,38 @@ def require_inertia(system: System) -> None:
     system.cached("has inertia", check)
 
 
-def _loose_in_tree(system: System) -> int | None:
-    """Return the index in v of a velocity that moves no inertia, with descendants free; or None."""
+def _without_inertia_in_tree(system: System) -> int | None:
+    """Return the index in v of a velocity that moves no inertia, or None.
+
+    The joints of descendants are free to move.
+    """
     q = SX.sym("q", system.nq)
-    poses = link_poses(system.tree, normalised(system.tree, q))
-    both = casadi.horzcat(*inertia_pivots(system.tree, poses))
-    pivots = Function("pivots", [q, system.p], [both], {"cse": True})
+    pivots = inertia_pivots(system.tree, link_poses(system.tree, normalised(system.tree, q)))
+    return velocity_without_inertia(
+        system, Function("pivots", [q, system.p], list(pivots), {"cse": True})
+    )
+
+
+def velocity_without_inertia(system: System, pivots: Function) -> int | None:
+    """Return the largest index in v of a velocity of the tree that moves no inertia, or None.
+
+    It is tested at a random configuration.
+
+    Args:
+        system: open or closed mechanism.
+        pivots: Function of q, and of p if the system has parameters. It returns, by velocity, the
+            inertia with free joints of descendants, and that with locked ones.
+    """
     rng = np.random.default_rng(_SEED)
-    configuration = np.array(system.configuration) + rng.uniform(-1.0, 1.0, system.nq)
-    free, locked = np.array(pivots(configuration, system.p_default)).T
+    q = np.array(system.configuration) + rng.uniform(-1.0, 1.0, system.nq)
+    given = [q, system.p_default][: pivots.n_in()]
+    free, locked = (np.array(x).ravel() for x in pivots(*given))
     # magnitude: inertia from files may be negative, but must not be zero
     moves = np.abs(free) > _VANISHING * np.maximum(np.abs(locked), _NO_INERTIA)
     return None if moves.all() else int(np.max(np.flatnonzero(~moves)))
 
 
-def _loose_in_loops(system: System) -> int | None:
+def _without_inertia_in_loops(system: System) -> int | None:
     """Return the index in `system.active` of a velocity that moves no inertia, or None."""
     closure, q = system.closure, list(system.configuration)
     assert closure is not None
@@ -275,7 +316,9 @@ def _loose_in_loops(system: System) -> int | None:
 
 
 def hybrid_dynamics(system: System, prescribed: Sequence[str]) -> Function:
-    """Dynamics with prescribed motion of some joints: ``hybrid(q, v, tau, a_p) -> a, tau_p``.
+    """Return the dynamics with prescribed motion of some joints.
+
+    It is ``hybrid(q, v, tau, a_p) -> a, tau_p``.
 
     tau_p is the effort that a drive must add to tau at each prescribed velocity. For a closed
     system q and v must close the loops, and a third output lam contains the efforts of the
@@ -296,7 +339,7 @@ def hybrid_dynamics(system: System, prescribed: Sequence[str]) -> Function:
             independently.
     """
     require_system(system)
-    numbers = _numbers(system, prescribed)
+    numbers = _prescribed_indices(system, prescribed)
 
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, "tree")
@@ -310,8 +353,11 @@ def hybrid_dynamics(system: System, prescribed: Sequence[str]) -> Function:
     return model_function(system, ("hybrid", numbers), build)
 
 
-def _numbers(system: System, prescribed: Sequence[str]) -> tuple[int, ...]:
-    """Return the indices in v of prescribed velocities. Raise ModelError for invalid names."""
+def _prescribed_indices(system: System, prescribed: Sequence[str]) -> tuple[int, ...]:
+    """Return the indices in v of the prescribed velocities.
+
+    Raise ModelError if a name is unknown or repeated, or the loops tie the velocities.
+    """
     names = [speed.name for speed in system.speeds]
     prescribed = names_given(f"{system.name}: prescribed", prescribed, names[0])
     if not prescribed:
@@ -336,9 +382,14 @@ def _numbers(system: System, prescribed: Sequence[str]) -> tuple[int, ...]:
 
 
 def are_independent(system: System, numbers: tuple[int, ...], *rows: NDArray[np.float64]) -> bool:
-    """Whether velocities `numbers` and rows (1, nv) are independent of each other and the loops.
+    """Return whether some velocities and rows are independent of each other and of the loops.
 
     The rank is tested at the assembled configuration.
+
+    Args:
+        system: open or closed mechanism.
+        numbers: indices in v of the velocities.
+        rows: (1, nv) coefficients of further velocities.
     """
     if not system.is_closed and not rows:
         return True

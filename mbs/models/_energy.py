@@ -13,7 +13,7 @@ from mbs.recursions.parts import PartsAt
 
 
 def energy(system: System, coordinates: str = "independent") -> Function:
-    """Kinetic energy, including rotors, and potential energy: ``energy(q, v) -> E, U``.
+    """Return kinetic energy, including rotors, and potential energy: ``energy(q, v) -> E, U``.
 
     The potential energy includes gravity, joint springs and energy stored in force elements.
 

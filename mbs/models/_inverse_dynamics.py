@@ -36,12 +36,12 @@ def inverse_dynamics(
     f_ext: bool = False,
     moving_base: bool = False,
 ) -> Function:
-    """Inverse dynamics, joint efforts for accelerations a: ``idm(q, v, a) -> tau``.
+    """Return the inverse dynamics, joint efforts for accelerations a: ``idm(q, v, a) -> tau``.
 
     Rotors, viscous and Coulomb friction and springs of the joints, and force elements are included.
-    If the motors of a closed system are not exactly its independent joints, the model is
-    idm(q, v_a, a_a) -> tau_m with the efforts of all `system.motors`. With redundant motors the sum
-    of squares of tau_m, in N m and N, is minimal; `actuation_null_space` spans all solutions.
+    If the motors of a closed system are not exactly its independent joints, the model is idm(q,
+    v_a, a_a) -> tau_m with the efforts of all `system.motors`. With redundant motors the sum of
+    squares of tau_m, in N m and N, is minimal; `actuation_null_space` spans all solutions.
 
     Source: Khalil & Kleinfinger 1987; Khalil & Creusot 1997, eq. 15-20 and 22.
 
@@ -56,8 +56,8 @@ def inverse_dynamics(
             and R_0 (3, 3), orientation of the base in the frame that gravity is expressed in.
 
     Returns:
-        Function of q (nq, 1), v and a (m, 1), f_ext, v_0, a_0, R_0; tau (m, 1), or tau_m (k, 1)
-        [N m or N].
+        Function of q (nq, 1), v and a (m, 1), f_ext, v_0, a_0, R_0; tau (m, 1), or tau_m (k, 1) [N
+        m or N].
     """
 
     def build() -> tuple[Named, Named, Named]:
@@ -80,7 +80,7 @@ def inverse_dynamics(
 def bias(
     system: System, coordinates: str = "independent", *, moving_base: bool = False
 ) -> Function:
-    """Joint efforts at zero acceleration (nonlinear effects): ``bias(q, v) -> H``.
+    """Return the joint efforts at zero acceleration (nonlinear effects): ``bias(q, v) -> H``.
 
     tau = A a + H. H contains Coriolis, centrifugal and gravity efforts, friction and springs of the
     joints, and force elements.
@@ -112,7 +112,7 @@ def bias(
 def gravity_effort(
     system: System, coordinates: str = "independent", *, moving_base: bool = False
 ) -> Function:
-    """Joint efforts that balance gravity and springs at rest: ``gravity(q) -> Q``.
+    """Return the joint efforts that balance gravity and springs at rest: ``gravity(q) -> Q``.
 
     Force elements act with their value at zero velocity: springs, stops and sources, not dampers.
 
@@ -148,7 +148,7 @@ def gravity_effort(
 def _efforts(system: System, s: ModelSymbols, a: SX, around: ExternalForces) -> tuple[SX, Named]:
     """Return the efforts in input coordinates for tree accelerations a (nv, 1).
 
-    The second result has the named intermediate quantities.
+    The second result are (name, scalar) of intermediate quantities.
     """
     dynamics = _dynamics(system, s, a, around)
     tau = dynamics.efforts + own_efforts(system, s, a)
@@ -156,24 +156,48 @@ def _efforts(system: System, s: ModelSymbols, a: SX, around: ExternalForces) -> 
 
 
 def tree_efforts(system: System, s: ModelSymbols, a: SX, around: ExternalForces) -> SX:
-    """(nv, 1) inverse dynamics of the tree for accelerations a (nv, 1), with joint friction."""
+    """Return the inverse dynamics (nv, 1) of the tree for accelerations a, with joint friction.
+
+    Args:
+        system: open or closed mechanism.
+        s: symbols of the system.
+        a: (nv, 1) accelerations of the tree.
+        around: base motion and external wrenches.
+    """
     return _dynamics(system, s, a, around).efforts + own_efforts(system, s, a)
 
 
 def own_efforts(system: System, s: ModelSymbols, a: SX) -> SX:
-    """(nv, 1) efforts of the joints themselves: rotors, friction, springs, stops and components."""
+    """Return the efforts (nv, 1) of the joints themselves and of components on coordinates.
+
+    They are efforts of rotors, friction, springs and stops.
+
+    Args:
+        system: open or closed mechanism.
+        s: symbols of the system.
+        a: (nv, 1) accelerations of the tree.
+    """
     acting = PartsAt(system, s.q, s.v_tree).efforts()
     return joint_efforts(system.tree, s.q, s.v_tree, a) + acting
 
 
 def _dynamics(system: System, s: ModelSymbols, a: SX, around: ExternalForces) -> Dynamics:
-    """Return the Newton-Euler recursion for accelerations a (nv, 1), with external wrenches."""
+    """Return the results of the Newton-Euler recursion for accelerations a (nv, 1).
+
+    `around` has the base motion and external wrenches.
+    """
     external = exerted(system, around, s.poses, s.q, s.v_tree)
     return newton_euler(system.tree, s.poses, s.v_tree, a, around.base, external)
 
 
 def tree_gravity(system: System, s: ModelSymbols, gravity: SX | None = None) -> SX:
-    """(nv, 1) tree efforts that balance gravity, springs, stops and sources at rest."""
+    """Return the tree efforts (nv, 1) that balance gravity, springs, stops and sources at rest.
+
+    Args:
+        system: open or closed mechanism.
+        s: symbols of the system.
+        gravity: (3, 1) gravity acceleration in the base frame [m/s^2]; default: that of the tree.
+    """
     rest = SX.zeros(system.nv)
     base = resting_base(system.tree.gravity if gravity is None else gravity)
     efforts = newton_euler(system.tree, s.poses, rest, rest, base).efforts
@@ -181,7 +205,14 @@ def tree_gravity(system: System, s: ModelSymbols, gravity: SX | None = None) -> 
 
 
 def static_efforts(system: System, s: ModelSymbols) -> SX:
-    """(nv, 1) tree efforts that balance springs, stops and sources at rest, without gravity."""
+    """Return the tree efforts (nv, 1) that balance springs, stops and sources at rest.
+
+    Gravity is not included.
+
+    Args:
+        system: open or closed mechanism.
+        s: symbols of the system.
+    """
     rest = SX.zeros(system.nv)
     acting = element_efforts(PartsAt(system, s.q, rest), s.poses)
     return spring_effort(system.tree, s.q) + acting

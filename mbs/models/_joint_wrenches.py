@@ -55,7 +55,7 @@ def weld_wrench(
     joint: JointRow,
     others: dict[str, Wrench],
 ) -> Wrench:
-    """Wrench of a Fixed joint on the body of frame_b, about and in frame_b.
+    """Return the wrench of a Fixed joint on the body of frame_b, about and in frame_b.
 
     It is the Newton-Euler balance of the part of the link on one side of the joint: inertial wrench
     plus the wrenches that this part exerts on joints, force elements and environment.
@@ -73,11 +73,11 @@ def weld_wrench(
     motions = link_accelerations(system.tree, s.poses, s.v_tree, a, around.base)
     motion = motions[link] if link >= 0 else around.base
     total = inertial_wrench(PseudoInertia.of(part.inertia), motion)
-    total = add_wrenches(total, (zeros(), _spin(system, part, s.v_tree, a, motion)))
+    total = add_wrenches(total, (zeros(), _rotor_momentum_rate(system, part, s.v_tree, a, motion)))
     elements = element_wrenches(PartsAt(system, s.q, s.v_tree), held=part.ports)
-    exerted = [elements.get(link), _outside(system, part, around).get(link)]
+    exerted = [elements.get(link), _external_wrenches(system, part, around).get(link)]
     exerted += [
-        _on_joint(system, s.q, row, link, side, others[row.name])
+        _wrench_on_joint(system, s.q, row, link, side, others[row.name])
         for row in system.joints
         for side in "ab"
         if row.name in others and (row.name, side) in part.ports
@@ -89,10 +89,13 @@ def weld_wrench(
     return part.sign * f, part.sign * m
 
 
-def _on_joint(system: System, q: SX, row: JointRow, link: int, side: str, wrench: Wrench) -> Wrench:
-    """Wrench that the body on `side` "a" or "b" exerts on a joint, in the frame of its link.
+def _wrench_on_joint(
+    system: System, q: SX, row: JointRow, link: int, side: str, wrench: Wrench
+) -> Wrench:
+    """Return the wrench that a body exerts on a joint, about and in the frame of its link `link`.
 
-    `wrench` is the joint wrench on the body of frame_b, about and in frame_b.
+    The body is on `side` "a" or "b". `wrench` is the joint wrench on the body of frame_b, about and
+    in frame_b.
     """
     T = relative_pose(system.tree, q, (link, Pose.identity()), row.frame_b)
     sign = 1 if side == "a" else -1
@@ -100,8 +103,10 @@ def _on_joint(system: System, q: SX, row: JointRow, link: int, side: str, wrench
     return sign * f, sign * m
 
 
-def _outside(system: System, part: WeldedPart, around: ExternalForces) -> dict[int, Wrench]:
-    """Wrenches f_ext that the bodies of a welded part exert on their environment, by link."""
+def _external_wrenches(
+    system: System, part: WeldedPart, around: ExternalForces
+) -> dict[int, Wrench]:
+    """Return the wrenches f_ext that the bodies of a part exert on their environment, by link."""
     f_ext = dict(around.inputs).get("f_ext")
     if f_ext is None:
         return {}
@@ -109,8 +114,13 @@ def _outside(system: System, part: WeldedPart, around: ExternalForces) -> dict[i
     return wrenches_on_links(system, casadi.mtimes(f_ext, casadi.diag(keep)))
 
 
-def _spin(system: System, part: WeldedPart, v: SX, a: SX, motion: Acceleration) -> SX:
-    """Rate of the angular momentum of the rotors on a part, (3, 1), in the frame of its link."""
+def _rotor_momentum_rate(
+    system: System, part: WeldedPart, v: SX, a: SX, motion: Acceleration
+) -> SX:
+    """Return the rate of the angular momentum of the rotors on a part, (3, 1), in its link frame.
+
+    `motion` is the motion of the link.
+    """
     total = zeros()
     for link in system.tree.links:
         if link.rotor is not None and (link.name, "a") in part.ports:
@@ -126,7 +136,7 @@ def joint_wrenches(
     f_ext: bool = False,
     moving_base: bool = False,
 ) -> Function:
-    """Wrenches that all joints transmit: ``joint_wrenches(q, v, a) -> F``.
+    """Return the wrenches that all joints transmit: ``joint_wrenches(q, v, a) -> F``.
 
     A column [force; moment] of F is the wrench that the body of frame_a exerts on the body of
     frame_b through the joint, about the origin of frame_b and in its axes. It contains all loads in
@@ -153,8 +163,8 @@ def joint_wrenches(
             `inverse_dynamics`.
 
     Returns:
-        Function of q (nq, 1), v, a and tau (m, 1), and optionally f_ext, v_0, a_0, R_0; F
-        (6, joints), one column for each row of `system.joints` [N, N m].
+        Function of q (nq, 1), v, a and tau (m, 1), and optionally f_ext, v_0, a_0, R_0; F (6,
+        joints), one column for each row of `system.joints` [N, N m].
     """
     require_system(system)
     check_coordinates(system, coordinates)
@@ -172,9 +182,16 @@ def joint_wrenches(
 
 
 def motion_inputs(system: System, s: ModelSymbols) -> tuple[Named, SX, SX | None]:
-    """Return named inputs (q, v, a, tau), accelerations of the tree, and the symbol tau.
+    """Return the inputs q, v, a and tau of a model, accelerations of the tree, and the symbol tau.
 
-    tau (nv, 1) is an input only with tree coordinates of a closed system, else None.
+    tau is an input only with tree coordinates of a closed system.
+
+    Args:
+        system: open or closed mechanism.
+        s: symbols of the system.
+
+    Returns:
+        (name, symbol) of each input, tree accelerations (nv, 1), and tau (nv, 1) or None.
     """
     name, a = s.input("a")
     inputs = [("q", s.q), ("v" + s.suffix, s.v), (name, a)]
@@ -188,7 +205,9 @@ def motion_inputs(system: System, s: ModelSymbols) -> tuple[Named, SX, SX | None
 def wrenches_of_joints(
     system: System, s: ModelSymbols, a: SX, tau: SX | None, around: ExternalForces
 ) -> list[Wrench]:
-    """Wrench of each row of `system.joints` on the body of frame_b, about and in frame_b.
+    """Return the wrench of each row of `system.joints` on the body of frame_b.
+
+    It is about the origin and in axes of frame_b.
 
     Args:
         system: open or closed mechanism.
@@ -209,7 +228,9 @@ def wrenches_of_joints(
         loads.append(part_wrenches(system, s.q, lam))
     through = transmitted_wrenches(system.tree, s.poses, sum_wrenches(*loads))
     between = {
-        joint.name: cut[joint.name] if joint.cut else _at_frame_b(system.tree, s.q, joint, through)
+        joint.name: cut[joint.name]
+        if joint.cut
+        else _wrench_at_frame_b(system.tree, s.q, joint, through)
         for joint in system.joints
         if joint.part is None
     }
@@ -222,7 +243,7 @@ def wrenches_of_joints(
 
 
 def row_efforts(system: System) -> Function:
-    """Efforts of all closure rows: ``row_efforts(q, v, a, tau) -> lam``.
+    """Return the efforts of all closure rows: ``row_efforts(q, v, a, tau) -> lam``.
 
     Args:
         system: closed mechanism. The motion q, v, a must close the loops; tau must be consistent
@@ -242,7 +263,7 @@ def row_efforts(system: System) -> Function:
 
 
 def shown_outputs(system: System, parts: PartsAt, a: SX, tau: SX) -> SX:
-    """(ny, 1) outputs of components, with the efforts of their constraint rows substituted.
+    """Return the outputs (ny, 1) of components, with the efforts of their rows substituted.
 
     Args:
         system: open or closed mechanism.
@@ -266,10 +287,17 @@ def shown_outputs(system: System, parts: PartsAt, a: SX, tau: SX) -> SX:
 def closure_efforts(
     system: System, s: ModelSymbols, a: SX, tau: SX | None, around: ExternalForces
 ) -> SX:
-    """(m, 1) efforts lam of all closure rows: J' lam = required efforts minus motor efforts.
+    """Return the efforts lam (m, 1) of all closure rows.
 
-    Efforts of dropped rows are zero. If the independent rows change with the configuration, lam has
-    the smallest norm.
+    J' lam are the required efforts minus the motor efforts. Efforts of dropped rows are zero. If
+    the independent rows change with the configuration, lam has the smallest norm.
+
+    Args:
+        system: closed mechanism.
+        s: symbols of the system.
+        a: (nv, 1) accelerations of the tree.
+        tau: (nv, 1) motor efforts; None if they follow from the motion by inverse dynamics.
+        around: base motion and external wrenches.
     """
     closure = system.closure
     assert closure is not None
@@ -292,8 +320,8 @@ def closure_efforts(
     return every
 
 
-def _at_frame_b(tree: Tree, q: SX, joint: JointRow, through: list[Wrench]) -> Wrench:
-    """Wrench of a tree joint on the body of frame_b, about and in frame_b.
+def _wrench_at_frame_b(tree: Tree, q: SX, joint: JointRow, through: list[Wrench]) -> Wrench:
+    """Return the wrench of a tree joint on the body of frame_b, about and in frame_b.
 
     Args:
         tree: tree of the system.

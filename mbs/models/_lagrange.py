@@ -23,7 +23,9 @@ fewer operations even in planar mechanisms."""
 
 
 def lagrange(system: System, method: str = "auto", coordinates: str = "independent") -> Function:
-    """Inertia matrix, Coriolis matrix, gravity and spring efforts: ``lagrange(q, v) -> A, B, Q``.
+    """Return the Lagrange form of the dynamic model: ``lagrange(q, v) -> A, B, Q``.
+
+    tau = A a + B v + Q with inertia matrix A, Coriolis matrix B, and gravity and spring efforts Q.
 
     dA/dt - 2 B is skew-symmetric. Friction and dampers are not included; Q contains the efforts of
     gravity and force elements at rest. For closed systems B is G' (A dG/dt + B G), where G is the
@@ -58,7 +60,7 @@ def lagrange(system: System, method: str = "auto", coordinates: str = "independe
 
 
 def _cheapest(system: System, coordinates: str) -> Function:
-    """Return the Lagrange form with fewer operations: Renaud's, or by Christoffel symbols."""
+    """Return the cheaper Lagrange form: Renaud's, or by Christoffel symbols."""
     renaud = _model(system, "renaud", coordinates)
     if system.nv > _SHORT or system.nq > system.nv:
         return renaud
@@ -66,7 +68,7 @@ def _cheapest(system: System, coordinates: str) -> Function:
 
 
 def _model(system: System, method: str, coordinates: str) -> Function:
-    """Build the Lagrange form (A, B, Q) by "renaud" or "christoffel"."""
+    """Return the Lagrange form (A, B, Q) by the method "renaud" or "christoffel" as a Function."""
 
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)

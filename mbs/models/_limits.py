@@ -40,7 +40,7 @@ class Limits:
 
 
 def limits(system: System, *, speed: Largest = None, effort: Largest = None) -> Limits:
-    """Bounds of positions, velocities and efforts of a system, for optimal control.
+    """Return the bounds of positions, velocities and efforts of a system, for optimal control.
 
     Position bounds are the intersection of joint limits and stops. Elements of unit quaternions are
     between -1 and 1. By default velocity and effort bounds are `velocity` and `effort` of the joint
@@ -56,15 +56,15 @@ def limits(system: System, *, speed: Largest = None, effort: Largest = None) -> 
             and stops of a joint do not overlap.
     """
     require_system(system)
-    q_lower, q_upper = _positions(system)
+    q_lower, q_upper = _position_limits(system)
     for row, least, largest in zip(system.coordinates, q_lower, q_upper, strict=True):
         if least > largest:
             raise ModelError(
                 f"{system.name}: limits and stops of {row.name!r} leave it nothing between"
                 f" {least:g} and {largest:g}; let them overlap"
             )
-    v_lower, v_upper = _ends([row.limits for row in system.speeds])
-    tau_lower, tau_upper = _ends([row.effort for row in system.speeds])
+    v_lower, v_upper = _bound_arrays([row.limits for row in system.speeds])
+    tau_lower, tau_upper = _bound_arrays([row.effort for row in system.speeds])
     for number, value in _magnitudes(system, "speed", speed):
         v_lower[number], v_upper[number] = -value, value
     for number, value in _magnitudes(system, "effort", effort):
@@ -79,13 +79,13 @@ def limits(system: System, *, speed: Largest = None, effort: Largest = None) -> 
     return Limits(q_lower, q_upper, v_lower, v_upper, tau_lower, tau_upper)
 
 
-def _ends(ranges: list[tuple[float, float] | None]) -> tuple[Array, Array]:
-    """Return arrays of lower and upper bounds; infinite for None."""
+def _bound_arrays(ranges: list[tuple[float, float] | None]) -> tuple[Array, Array]:
+    """Return arrays (n,) of lower and upper bounds; infinite for None."""
     lower, upper = zip(*(given or (-np.inf, np.inf) for given in ranges), strict=True)
     return np.array(lower, dtype=float), np.array(upper, dtype=float)
 
 
-def _positions(system: System) -> tuple[Array, Array]:
+def _position_limits(system: System) -> tuple[Array, Array]:
     """Return lower and upper limits (nq,) of positions, from coordinates and from stops."""
     lower, upper = np.full(system.nq, -np.inf), np.full(system.nq, np.inf)
     for k, coordinate in enumerate(system.coordinates):
@@ -102,22 +102,22 @@ def _positions(system: System) -> tuple[Array, Array]:
             one = len(levers) == 1 and levers[0].factor.is_one()
             place = levers[0].position if one else None
             if place is not None:
-                lower[place] = max(lower[place], _number(least, -np.inf))
-                upper[place] = min(upper[place], _number(largest, np.inf))
+                lower[place] = max(lower[place], _limit_or(least, -np.inf))
+                upper[place] = min(upper[place], _limit_or(largest, np.inf))
     return lower, upper
 
 
-def _number(limit: SX | None, otherwise: float) -> float:
+def _limit_or(limit: SX | None, otherwise: float) -> float:
     """Return a limit as a float, or `otherwise` if it is None or symbolic."""
     value = SX(otherwise) if limit is None else SX(limit)
     return float(value) if value.is_constant() else otherwise
 
 
 def _magnitudes(system: System, what: str, given: Largest) -> list[tuple[int, float]]:
-    """Return (index in v, largest magnitude) for each named velocity of the user's mapping.
+    """Return (index in v, largest magnitude) for each entry of a mapping from names to numbers.
 
-    Raises:
-        ModelError: a name is unknown, or a value is not positive.
+    `what` is the argument in messages. Raise ModelError if a name is unknown, or a value is not
+    positive.
     """
     if given is not None and not isinstance(given, Mapping):
         raise ModelError(

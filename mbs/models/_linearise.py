@@ -26,9 +26,9 @@ from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.assembly.tree import position_rate
 from mbs.errors import ModelError
 from mbs.loops.closure_equations import closure_rows, independent_closure
-from mbs.loops.configuration import Guess, Start, Values, start
+from mbs.loops.configuration import Guess, Start, Values
 from mbs.loops.velocity import velocity_rows
-from mbs.models._dae import driving, motors, start_efforts
+from mbs.models._dae import driving, motors, start_values
 from mbs.models._direct_dynamics import independent_dynamics
 from mbs.models._joint_wrenches import shown_outputs
 from mbs.models._measurements import readings, with_readings
@@ -40,7 +40,6 @@ from mbs.models.contacts import (
     require_lasting_rows,
     require_no_contacts,
 )
-from mbs.models.state.signals import by_name
 from mbs.models.symbols import (
     ModelSymbols,
     derivatives_check,
@@ -49,7 +48,7 @@ from mbs.models.symbols import (
     surroundings,
     symbols_of,
 )
-from mbs.result import Result, State, device_states_of, state_of
+from mbs.result import Result, State
 from mbs.solvers.linear import solve_square
 from mbs.text import did_you_mean, quoted
 
@@ -137,19 +136,8 @@ class Linearisation:
             Unclosable: the loops cannot be closed at q0.
         """
         system = self.system
-        q0, own = state_of(q0), device_states_of(states)
-        q, v = start(system, q0, v0, parameters, guess)
-        if isinstance(q0, State) and own is None:
-            own = q0.z
-        point = {
-            "q": q,
-            "v": v,
-            "v_a": v[list(system.active)],
-            "tau": start_efforts(system, tau0),
-            "z": by_name(system, "states", own, system.states, system.z_start),
-            "u": by_name(system, "inputs", inputs, system.inputs, system.u_default),
-            "p": system.parameter_values(parameters),
-        }
+        point = start_values(system, q0, v0, tau0, states, inputs, parameters, guess)
+        point["v_a"] = point["v"][list(system.active)]
         if self.holds is not None:
             self._require_mode(*(point[name] for name in self.holds.name_in()))
         found = self.function(*(point[name] for name in self.function.name_in()))
@@ -157,10 +145,9 @@ class Linearisation:
         return LinearModel(A, B, C, D, self.x, self.u, self.y)
 
     def _require_mode(self, *point: Any) -> None:
-        """Raise ModelError if the contacts at this state are not in the requested mode.
+        """Raise ModelError if the contacts at a state are not in the requested mode.
 
-        Args:
-            point: numeric inputs of `holds`.
+        `point` are the numeric inputs of `holds`.
         """
         assert self.holds is not None
         zero, positive = (np.array(value).ravel() for value in self.holds.call(point))
@@ -189,7 +176,9 @@ def linearise(
     outputs: Sequence[str] | None = None,
     mode: Mapping[str, float] | None = None,
 ) -> Linearisation:
-    """Linearise the equations of motion about any state, with loops and rolling constraints.
+    """Return the linearised equations of motion as functions of the state.
+
+    Loops and rolling constraints are included.
 
     A sticking contact keeps one velocity at zero, which adds a zero eigenvalue.
 
@@ -211,7 +200,7 @@ def linearise(
     require_system(system)
     if mode is None:
         require_no_contacts(system, "linearise without mode=")
-    modes = _modes(system, values_given(f"{system.name}: mode", mode, '"clutch": 0'))
+    modes = _mode_numbers(system, values_given(f"{system.name}: mode", mode, '"clutch": 0'))
     known = _output_units(system)
     names = list(known)[: system.nq + system.nv]
     if outputs is not None:
@@ -233,7 +222,7 @@ def linearise(
     def held() -> tuple[Named, Named]:
         s = symbols_of(system)
         tau = SX.sym("tau", system.nv)
-        found = _contact(system, s, tau + part_equations(system, s.q, s.v_tree)[0], modes)
+        found = _contact_in_modes(system, s, tau + part_equations(system, s.q, s.v_tree)[0], modes)
         assert found is not None
         contact, (positive, stuck) = found
         still = stuck * contact.state.velocity
@@ -247,7 +236,7 @@ def linearise(
     words: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
     if modes:
         holds = model_function(system, ("holds", *modes), held, check)
-        words = _words(system)
+        words = _condition_texts(system)
     free = [system.speeds[k] for k in system.free]
     active = [system.speeds[k] for k in system.active]
     x = [(f"{row.name}.q", row.unit.removesuffix("/s")) for row in free]
@@ -265,8 +254,11 @@ def linearise(
     )
 
 
-def _modes(system: System, mode: Mapping[str, float]) -> tuple[float, ...]:
-    """Return the 2 k modes of the k contact rows: limits, then directions of sliding."""
+def _mode_numbers(system: System, mode: Mapping[str, float]) -> tuple[float, ...]:
+    """Return the 2 k modes of the k contact rows: limits, then directions of sliding.
+
+    `mode` is given by name; other modes are 0. Raise ModelError for unknown names or other values.
+    """
     contacts = contacts_of(system)
     require_lasting_rows(system, contacts)
     elements = (*contacts.stops, *contacts.frictions)
@@ -282,8 +274,8 @@ def _modes(system: System, mode: Mapping[str, float]) -> tuple[float, ...]:
     return tuple(float(mode.get(x.name, 0)) if x else 0.0 for x in elements)
 
 
-def _words(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Describe the zero quantities of `holds`, and each event that a non-positive one means."""
+def _condition_texts(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return descriptions of the elements of `zero` and `positive` of `holds`, for messages."""
     contacts = contacts_of(system)
     still = [f"the velocity on which {name} acts" for name in contacts.names]
     still += [f"the distance of {name} from its limit" for name in contacts.names]
@@ -297,14 +289,13 @@ def _words(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return tuple(still), tuple(f"{name} {told[kind]}" for kind in KINDS for name in contacts.names)
 
 
-def _contact(
+def _contact_in_modes(
     system: System, s: ModelSymbols, tau: SX, modes: Sequence[float]
 ) -> tuple[ContactEquations, tuple[SX, SX]] | None:
-    """Contact equations with the mode symbols replaced by the numbers `modes`.
+    """Return the contact equations with the mode symbols replaced by the numbers `modes`.
 
-    Returns:
-        the equations, then the indicators that must be positive (5 k, 1) and the flags of stuck
-        rows (k, 1). None for a system without contacts.
+    The second result are the indicators that must be positive (5 k, 1) and the flags of stuck rows
+    (k, 1). None for a system without contacts.
     """
     found = contact_equations(system, s.q, s.v_tree, tau, {})
     if found is None:
@@ -340,7 +331,7 @@ def _matrices(
     motor_efforts = efforts[: efforts.numel() - system.u.numel()]
     every = tau + given
     # the independent accelerations
-    contact = _contact(system, s, every, modes)
+    contact = _contact_in_modes(system, s, every, modes)
     if contact is None:
         pushed = s.reduced_effort(every) if s.reduction is not None else every
         (a_a,) = outputs_of(system, independent_dynamics(system), q, v_a, pushed)
@@ -351,9 +342,9 @@ def _matrices(
     # position change dq = T dxi for small displacements xi of the free coordinates
     speed = SX.sym("v", system.nv)
     N = casadi.jacobian(position_rate(system.tree, q, speed), speed)
-    T = casadi.mtimes(N, _tangents(system, q))
+    T = casadi.mtimes(N, _free_tangents(system, q))
     rate = position_rate(system.tree, q, v)
-    back = _selected(system, N)
+    back = _left_inverse(system, N)
     # T' xi + T xi' = d(rate)/dq T xi + d(rate)/dv_a dv_a, projected on the free coordinates
     turning = casadi.jtimes(casadi.vec(T), q, rate)
     A11 = casadi.mtimes(
@@ -384,7 +375,7 @@ def _matrices(
     )
 
 
-def _tangents(system: System, q: SX) -> SX:
+def _free_tangents(system: System, q: SX) -> SX:
     """Return tree velocities (nv, m) for unit rates of the free coordinates, with closed loops."""
     free = list(system.free)
     if system.closure is None:
@@ -403,7 +394,7 @@ def _tangents(system: System, q: SX) -> SX:
     return T
 
 
-def _selected(system: System, N: SX) -> SX:
+def _left_inverse(system: System, N: SX) -> SX:
     """Return a left inverse (m, nq) of N: maps dq/dt to the rates of the m free coordinates."""
     # columns of N are orthogonal; the columns of a quaternion have the squared length 1/4
     sizes = casadi.sum1(N * N)
@@ -412,7 +403,10 @@ def _selected(system: System, N: SX) -> SX:
 
 
 def _outputs(system: System, s: ModelSymbols, a: SX, tau: SX, names: Sequence[str]) -> SX:
-    """(k, 1) expressions of the requested outputs."""
+    """Return the expressions (k, 1) of the outputs `names`.
+
+    `a` (nv, 1) are the accelerations and `tau` (nv, 1) the joint efforts of the tree.
+    """
     values: dict[str, SX] = {}
     for k, coordinate in enumerate(system.coordinates):
         values[f"{coordinate.name}.q"] = s.q[k]

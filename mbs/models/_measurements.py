@@ -45,7 +45,7 @@ from mbs.spatial import Wrench, zeros
 
 
 def measurements(system: System, coordinates: str = "independent") -> Function:
-    """Sensor signals: ``measurements(q, v, a) -> tip_p, tip_v, ...``.
+    """Return the sensor signals: ``measurements(q, v, a) -> tip_p, tip_v, ...``.
 
     There is one output per quantity of each sensor, in the order of `system.sensors`, with the
     names of `AttachedSensor.outputs`: tip_p is the position of sensor tip, arm_tip_p of arm.tip.
@@ -83,7 +83,7 @@ def measurements(system: System, coordinates: str = "independent") -> Function:
 def readings(
     system: System, s: ModelSymbols, a: SX, tau: SX | None, around: ExternalForces
 ) -> list[tuple[str, SX]]:
-    """Named outputs of `measurements`, with external wrenches.
+    """Return (name, expression) of the outputs of `measurements`, with external wrenches.
 
     Args:
         system: open or closed mechanism.
@@ -106,7 +106,9 @@ def with_readings(
     state: tuple[SX, SX, SX | None, SX],
     wrenches: SX | None = None,
 ) -> list[SX]:
-    """Substitute sensor signals of accelerations and forces that are wired to component inputs.
+    """Replace sensor signals of accelerations and forces in expressions by their values.
+
+    They are signals that are wired to component inputs.
 
     Args:
         system: open or closed mechanism.
@@ -181,14 +183,14 @@ def _observed(
     )
 
 
-def _on_frames(state: _Observed, attached: AttachedSensor) -> Readings:
-    """Signals of a sensor of frame motion, or of the distance between frames."""
+def _frame_signals(state: _Observed, attached: AttachedSensor) -> Readings:
+    """Return the signals of a sensor of frame motion, or of a distance of frames, by name."""
     tree = state.system.tree
     return frame_readings(tree, attached, state.s.q, state.velocities, state.accelerations)
 
 
-def _coordinate(state: _Observed, attached: AttachedSensor) -> Readings:
-    """Return position, velocity and acceleration of the coordinate that a sensor measures."""
+def _coordinate_signals(state: _Observed, attached: AttachedSensor) -> Readings:
+    """Return position, velocity and acceleration of the coordinate of a sensor, by name."""
     system, s, name = state.system, state.s, attached.coordinate
     if attached.frames:
         return _cut_rotation(state, attached)
@@ -200,7 +202,10 @@ def _coordinate(state: _Observed, attached: AttachedSensor) -> Readings:
 
 
 def _cut_rotation(state: _Observed, attached: AttachedSensor) -> Readings:
-    """Quaternion element, or elements of angular velocity and acceleration, of a cut joint."""
+    """Return the signals, by name, of an element of the rotation of a cut joint.
+
+    It is a quaternion element, or an element of angular velocity and acceleration.
+    """
     frame_a, frame_b = attached.frames
     motion = relative_motion(state.system.tree, frame_a, frame_b, state.s.q, state.velocities)
     element = attached.coordinate.rpartition(".")[2]
@@ -212,8 +217,8 @@ def _cut_rotation(state: _Observed, attached: AttachedSensor) -> Readings:
     return {"v": w[number], "a": wd[number]}
 
 
-def _transmitted(state: _Observed, attached: AttachedSensor) -> Readings:
-    """Return force and moment that a joint transmits, in the axes of its sensor."""
+def _joint_load(state: _Observed, attached: AttachedSensor) -> Readings:
+    """Return the force f and moment m that a joint transmits, in the axes of its sensor."""
     assert attached.joint is not None
     f, m = state.wrenches[attached.joint]
     home = attached.frames[1]
@@ -221,7 +226,7 @@ def _transmitted(state: _Observed, attached: AttachedSensor) -> Readings:
 
 
 def _power(state: _Observed, attached: AttachedSensor) -> Readings:
-    """Return the power that the wrench of a joint delivers to the body of its frame_b."""
+    """Return the power P that a joint delivers to the body of its frame_b."""
     assert attached.joint is not None
     f, m = state.wrenches[attached.joint]
     V, w = frame_velocity(attached.frames[1], state.velocities)
@@ -229,8 +234,8 @@ def _power(state: _Observed, attached: AttachedSensor) -> Readings:
 
 
 _READ: dict[str, Callable[[_Observed, AttachedSensor], Readings]] = {
-    **dict.fromkeys(("absolute", "relative", "distance"), _on_frames),
-    "coordinate": _coordinate,
-    "wrench": _transmitted,
+    **dict.fromkeys(("absolute", "relative", "distance"), _frame_signals),
+    "coordinate": _coordinate_signals,
+    "wrench": _joint_load,
     "power": _power,
 }

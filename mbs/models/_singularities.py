@@ -54,24 +54,29 @@ def variable(number: int) -> Polynomial:
 
 
 def total(a: Polynomial, b: Polynomial, sign: int = 1) -> Polynomial:
-    """Return the sum a + sign b."""
+    """Return the polynomial a + sign b. Raise NotTrigonometric if it is too long."""
     result = dict(a)
     for monomial, coefficient in b.items():
         _add(result, monomial, sign * coefficient)
-    return _within_reason({m: c for m, c in result.items() if c})
+    return _require_few_terms({m: c for m, c in result.items() if c})
 
 
 def product(a: Polynomial, b: Polynomial) -> Polynomial:
-    """Return the product of two polynomials."""
+    """Return the product of two polynomials. Raise NotTrigonometric if it is too long.
+
+    Args:
+        a: first factor.
+        b: second factor.
+    """
     result: Polynomial = {}
     for m, x in a.items():
         for n, y in b.items():
             _add(result, _join(m, n), x * y)
-    return _within_reason({m: c for m, c in result.items() if c})
+    return _require_few_terms({m: c for m, c in result.items() if c})
 
 
 def _add(result: Polynomial, monomial: Monomial, coefficient: Fraction) -> None:
-    """Add a term to a polynomial in place; a sum of rounding size becomes zero."""
+    """Add coefficient times monomial to a polynomial, in place; rounding errors become zero."""
     before = result.get(monomial, Fraction(0))
     both = before + coefficient
     cancelled = abs(both) <= _ROUNDING * (abs(before) + abs(coefficient))
@@ -86,7 +91,7 @@ def _join(m: Monomial, n: Monomial) -> Monomial:
     return tuple(sorted(powers.items()))
 
 
-def _within_reason(polynomial: Polynomial) -> Polynomial:
+def _require_few_terms(polynomial: Polynomial) -> Polynomial:
     """Return a polynomial; raise NotTrigonometric if it has too many terms."""
     if len(polynomial) > _MOST_TERMS:
         raise NotTrigonometric
@@ -94,7 +99,11 @@ def _within_reason(polynomial: Polynomial) -> Polynomial:
 
 
 def polynomial_of(expression: SX, variables: SX) -> Polynomial:
-    """Convert an expression to a polynomial in variables, their sines and cosines.
+    """Return an expression as a polynomial in variables, their sines and cosines.
+
+    Args:
+        expression: scalar expression.
+        variables: (n, 1) symbols.
 
     Raises:
         NotTrigonometric: the expression is not such a polynomial, or is too long.
@@ -105,11 +114,13 @@ def polynomial_of(expression: SX, variables: SX) -> Polynomial:
     least = _CONSTANT_ROUNDING * max((abs(node.value) for node in graph.nodes), default=0.0)
     values: list[Polynomial] = []
     for number in range(len(graph.nodes)):
-        values.append(lowered(_value(graph, number, values, least), "s"))
+        values.append(lowered(_node_polynomial(graph, number, values, least), "s"))
     return values[graph.results[0][0]]
 
 
-def _value(graph: Graph, number: int, values: list[Polynomial], least: float) -> Polynomial:
+def _node_polynomial(
+    graph: Graph, number: int, values: list[Polynomial], least: float
+) -> Polynomial:
     """Return the polynomial of node `number` of an expression graph.
 
     Args:
@@ -135,7 +146,7 @@ def _value(graph: Graph, number: int, values: list[Polynomial], least: float) ->
 
 
 def _operation(op: int, operands: list[Polynomial]) -> Polynomial:
-    """Return the polynomial of a CasADi operation (`op`) on polynomials."""
+    """Return the polynomial of the CasADi operation `op`; raise NotTrigonometric if it is none."""
     two: dict[int, Callable[[Polynomial, Polynomial], Polynomial]] = {
         casadi.OP_ADD: total,
         casadi.OP_SUB: lambda a, b: total(a, b, -1),
@@ -150,14 +161,20 @@ def _operation(op: int, operands: list[Polynomial]) -> Polynomial:
 
 
 def _constant(value: float, least: float) -> Polynomial:
-    """Constant polynomial; zero for a number up to `least`, the rounding error of the graph."""
+    """Return the constant polynomial; zero for a number up to `least`, its rounding error.
+
+    Raise NotTrigonometric if the number is not finite.
+    """
     if not math.isfinite(value):
         raise NotTrigonometric
     return {(): Fraction(repr(value))} if abs(value) > least else {}
 
 
 def _sine_cosine(angle: Polynomial) -> tuple[Polynomial, Polynomial]:
-    """Sine and cosine of a sum of variables, expanded by the addition theorems."""
+    """Return sine and cosine of a sum of variables, expanded by the addition theorems.
+
+    Raise NotTrigonometric unless the factors are whole numbers from -4 to 4.
+    """
     s: Polynomial = {}
     c: Polynomial = {(): Fraction(1)}
     for monomial, times in angle.items():
@@ -177,7 +194,12 @@ def _sine_cosine(angle: Polynomial) -> tuple[Polynomial, Polynomial]:
 
 
 def lowered(polynomial: Polynomial, which: Literal["s", "c"]) -> Polynomial:
-    """Eliminate even powers of sines ("s") or of cosines ("c") by s^2 + c^2 = 1."""
+    """Eliminate even powers of sines ("s") or of cosines ("c") by s^2 + c^2 = 1.
+
+    Args:
+        polynomial: polynomial to reduce.
+        which: kind to eliminate.
+    """
     result: Polynomial = {}
     for monomial, coefficient in polynomial.items():
         term: Polynomial = {(): coefficient}
@@ -196,7 +218,7 @@ def lowered(polynomial: Polynomial, which: Literal["s", "c"]) -> Polynomial:
 
 
 def with_sums_of_angles(polynomial: Polynomial) -> Polynomial:
-    """Convert products of sines and cosines to sums of sines and cosines of sums of angles."""
+    """Return a polynomial with products of sines and cosines as functions of sums of angles."""
     result: Polynomial = {}
     for monomial, coefficient in polynomial.items():
         rest = tuple((atom, power) for atom, power in monomial if atom[0] == "x")
@@ -209,7 +231,10 @@ def with_sums_of_angles(polynomial: Polynomial) -> Polynomial:
 
 
 def _times_wave(waves: Polynomial, atom: Atom) -> Polynomial:
-    """Multiply a sum of sines and cosines by `atom`: 2 cos a cos b = cos(a - b) + cos(a + b)."""
+    """Return a sum of sines and cosines times the sine or cosine `atom`, again as a sum.
+
+    The identities are such as 2 cos a cos b = cos(a - b) + cos(a + b).
+    """
     result: Polynomial = {}
     for monomial, coefficient in waves.items():
         if not monomial:
@@ -269,7 +294,7 @@ class Factored:
 
 
 def factored(polynomial: Polynomial) -> Factored:
-    """Factor a polynomial, and write each factor in its shortest form.
+    """Return a polynomial as a product of factors, each in its shortest form.
 
     Raises:
         NotTrigonometric: the polynomial is too long.
@@ -282,13 +307,13 @@ def factored(polynomial: Polynomial) -> Factored:
 
 
 def _shortest(polynomial: Polynomial) -> Polynomial:
-    """Return a polynomial, with sums of angles if that has fewer terms."""
+    """Return the polynomial, or its form with sums of angles if that has fewer terms."""
     summed = with_sums_of_angles(polynomial)
     return summed if len(summed) < len(polynomial) else polynomial
 
 
 def _factored(polynomial: Polynomial) -> Factored:
-    """Return a trigonometric polynomial as a product of factors with powers."""
+    """Return a polynomial as a product of powers; raise NotTrigonometric if it is too long."""
     if len(polynomial) == 1:
         ((monomial, coefficient),) = polynomial.items()
         return Factored(
@@ -314,7 +339,7 @@ def _factored(polynomial: Polynomial) -> Factored:
 
 
 def _from_powers(terms: Mapping[tuple[int, ...], object], atoms: list[Atom]) -> Polynomial:
-    """Return a polynomial from coefficients by the exponents of its atoms."""
+    """Return the polynomial with given coefficients, by the exponents of the atoms."""
     return {
         tuple((atom, power) for atom, power in zip(atoms, powers, strict=True) if power): Fraction(
             str(coefficient)
@@ -343,7 +368,7 @@ def value(polynomial: Polynomial, variables: SX) -> SX:
 
 
 def text(polynomial: Polynomial, names: list[str], name_of_angle: Callable[[Atom], str]) -> str:
-    """Print a polynomial; each product has number, variables, cosines and sines in this order.
+    """Return a polynomial as text; a product has number, variables, cosines, sines in this order.
 
     Args:
         polynomial: polynomial to print.
@@ -386,7 +411,7 @@ class Writer:
         ]
 
     def is_constant(self, polynomial: Polynomial) -> bool:
-        """Whether a polynomial is independent of all positions."""
+        """Return whether a polynomial is independent of all positions."""
         return all(
             number >= self._positions
             for monomial in polynomial
@@ -399,6 +424,7 @@ class Writer:
         return text(polynomial, self._names, self._angle)
 
     def _angle(self, atom: Atom) -> str:
+        """Return the text of a sine or cosine: S23, or sin(q2 + q3)."""
         kind, of = atom
         if all(times == 1 and self._short[number] for number, times in of):
             return kind.upper() + "".join(self._short[number] for number, _ in of)
@@ -465,7 +491,9 @@ def singularities(
     expressed_in: str | int = "base",
     coordinates: str = "independent",
 ) -> Singularities:
-    """Singular configurations of a frame, as factors of the determinant of its Jacobian.
+    """Return the singular configurations of a frame, as factors of a determinant.
+
+    It is the determinant of the Jacobian of the frame, or of a square submatrix.
 
     Each diagonal block of the block triangular Jacobian contributes its determinant. Determinants
     of blocks of up to three rows are factored as polynomials in sines and cosines. The determinant
@@ -517,7 +545,7 @@ def _constant_and_factors(
     values: dict[str, SX] = {}
     assert square.blocks is not None
     for block, det in zip(square.blocks, square.determinants(), strict=True):
-        parts = _parts(system, block, det, variables)
+        parts = _block_factors(system, block, det, variables)
         if parts is None:
             label = _label(chosen, block)
             powers[label], values[label] = 1, det
@@ -537,8 +565,11 @@ def _constant_and_factors(
     return _product_text(number, constants), factors
 
 
-def _parts(system: System, block: Block, det: SX, variables: SX) -> Factored | None:
-    """Factors of the determinant of a block; None if it is too large or the check fails."""
+def _block_factors(system: System, block: Block, det: SX, variables: SX) -> Factored | None:
+    """Return the factors of the determinant of a block in `variables`, checked at random points.
+
+    None if the block is too large or the check fails.
+    """
     if block.size > _FACTORED:
         return None
     try:
@@ -556,10 +587,9 @@ def _parts(system: System, block: Block, det: SX, variables: SX) -> Factored | N
 
 
 def _scale(polynomial: Polynomial) -> tuple[Polynomial, Fraction]:
-    """Scale a polynomial to a positive first coefficient and coefficients up to 12.
+    """Return a polynomial with a positive first coefficient and coefficients up to 12.
 
-    Returns:
-        scaled polynomial and the scale by which to multiply it.
+    The second result is the scale by which it was divided.
     """
     first = next(iter(polynomial.values()))
     largest = max(abs(coefficient) for coefficient in polynomial.values())
@@ -583,7 +613,7 @@ def _product_text(number: Fraction, constants: dict[str, int]) -> str:
 
 
 def _label(chosen: Selection, block: Block) -> str:
-    """Return text for a block of the Jacobian that is not factored."""
+    """Return a description of a block of the Jacobian that is not factored."""
     names = ", ".join(chosen.names[column] for column in block.columns)
     return f"determinant of the {block.size} x {block.size} block of {names}"
 

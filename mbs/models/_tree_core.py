@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import casadi
-import numpy as np
 from casadi import Function
 
 from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction, require_system
 from mbs.assembly.tree import normalised
 from mbs.errors import ModelError
-from mbs.models._direct_dynamics import direct_dynamics
+from mbs.models._direct_dynamics import direct_dynamics, velocity_without_inertia
 from mbs.models._inverse_dynamics import inverse_dynamics
 from mbs.models.tree_table import shapes_of, table_of, unknown_to_core
 from mbs.native import compiled
@@ -54,7 +53,10 @@ class TreeCore:
 
     @property
     def inertia_matrix(self) -> Function:
-        """Mass matrix ``inertia(q) -> A``, not differentiable; see `inertia_matrix`."""
+        """Inertia matrix (mass matrix) ``inertia(q) -> A``, not differentiable.
+
+        See `inertia_matrix`.
+        """
         return core_function(self.system, "inertia")
 
     @property
@@ -64,17 +66,17 @@ class TreeCore:
 
     @property
     def idm_derivatives(self) -> Function:
-        """Derivatives of inverse dynamics; see `inverse_dynamics_derivatives`.
+        """``idm_derivatives(q, v, a) -> dtau_dq, dtau_dv, dtau_da, tau``, not differentiable.
 
-        ``idm_derivatives(q, v, a) -> dtau_dq, dtau_dv, dtau_da, tau``. Not differentiable.
+        These are derivatives of inverse dynamics, see `inverse_dynamics_derivatives`.
         """
         return core_function(self.system, "idm_derivatives")
 
     @property
     def ddm_derivatives(self) -> Function:
-        """Derivatives of forward dynamics; see `direct_dynamics_derivatives`.
+        """``ddm_derivatives(q, v, tau) -> da_dq, da_dv, da_dtau, a``, not differentiable.
 
-        ``ddm_derivatives(q, v, tau) -> da_dq, da_dv, da_dtau, a``. Not differentiable.
+        These are derivatives of forward dynamics, see `direct_dynamics_derivatives`.
         """
         return core_function(self.system, "ddm_derivatives")
 
@@ -119,7 +121,10 @@ class CoreLibrary:
 
 
 def core_library(system: System) -> CoreLibrary:
-    """Compile, or load from the cache, the library of all models of a tree.
+    """Return the library of all models of a tree, compiled or from the cache.
+
+    Args:
+        system: open mechanism.
 
     Raises:
         ModelError: the tree core does not support the system.
@@ -143,7 +148,7 @@ _BY_PARAMETERS = [by_parameters(name) for name in ("idm", "ddm")]
 
 
 def _by_parameters(system: System, files: Mapping[str, str]) -> str:
-    """C source whose parameter derivatives are built from the equations at their first call.
+    """Return C source whose parameter derivatives are built from equations at their first call.
 
     The source works only in the current process.
 
@@ -171,6 +176,9 @@ def core_function(system: System, name: str) -> Function:
     Args:
         system: open mechanism.
         name: key of `CoreLibrary.shapes`.
+
+    Raises:
+        ModelError: the name starts with "ddm", and a joint moves no inertia.
     """
 
     def build() -> Function:
@@ -190,27 +198,14 @@ def core_function(system: System, name: str) -> Function:
 # Detection of velocities that move no inertia.
 
 
-_SEED = 20260103
-_VANISHING = 1e-12
-"""Ratio of the inertia against a velocity with free descendants to its inertia with locked
-descendants, below which it counts as zero: a sum over all links has a rounding error of 1e-15."""
-_NO_INERTIA = 1e-30
-"""Smallest denominator of this ratio [kg m^2 or kg]; it avoids 0/0, and no body has so little."""
-
-
 def _require_inertia(system: System) -> None:
     """Raise ModelError if a velocity of the tree moves no inertia, as in `direct_dynamics`."""
     if any(p.default is None for p in system.parameters):
         return
     pivots = casadi.external("pivots", str(core_library(system).path))
-    rng = np.random.default_rng(_SEED)
-    q = np.array(system.configuration) + rng.uniform(-1.0, 1.0, system.nq)
-    p = [system.p_default] if system.parameters else []
-    free, locked = (np.array(x).ravel() for x in pivots(q, *p))
-    # magnitude: inertia from files may be negative, but must not be zero
-    moves = np.abs(free) > _VANISHING * np.maximum(np.abs(locked), _NO_INERTIA)
-    if not moves.all():
-        name = system.speeds[int(np.max(np.flatnonzero(~moves)))].name
+    number = velocity_without_inertia(system, pivots)
+    if number is not None:
+        name = system.speeds[number].name
         raise ModelError(
             f"{system.name}: {name} can move without moving any inertia, so its acceleration"
             " is not determined; give mass to what it carries, or a rotor inertia Ia"

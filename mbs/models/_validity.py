@@ -12,7 +12,7 @@ from mbs.loops.examination import loop_rows
 
 
 def validity(system: System) -> Function:
-    """Validity of positions and parameters: ``validity(q) -> residual, bound``.
+    """Return the validity of positions and parameters: ``validity(q) -> residual, bound``.
 
     Valid if ``residual <= bound`` for each row; NaN is invalid. The rows, named by `validity_rows`,
     are: unit norm of quaternions, bounds of parameters, loop closure relative to the size of the
@@ -48,7 +48,7 @@ def validity(system: System) -> Function:
 
 
 def validity_rows(system: System) -> tuple[str, ...]:
-    """Names of the rows of `validity`, in order.
+    """Return the names of the rows of `validity`, in order.
 
     Args:
         system: open or closed mechanism.
@@ -58,5 +58,5 @@ def validity_rows(system: System) -> tuple[str, ...]:
 
 
 def _rows(system: System, q: SX) -> list[ValidityRow]:
-    """Return the conditions under which a configuration q is valid for the models."""
+    """Return the conditions, with residual and bound, under which q is valid for the models."""
     return [*plain_rows(system, q), *(loop_rows(system, q) if system.is_closed else [])]

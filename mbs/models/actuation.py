@@ -24,7 +24,7 @@ from mbs.spatial import zeros
 
 
 def actuation_matrix(system: System) -> Function:
-    """Actuation matrix: ``actuation(q) -> B`` with tau_a = B tau_m.
+    """Return the actuation matrix of a system: ``actuation(q) -> B`` with tau_a = B tau_m.
 
     B maps efforts tau_m of the motors to efforts tau_a of the independent joints with equal power:
     tau_m' v_m = tau_a' v_a. `bias`, `gravity_effort`, `lagrange` and the derivatives of the dynamic
@@ -49,7 +49,7 @@ def actuation_matrix(system: System) -> Function:
 
 
 def actuation_null_space(system: System) -> Function:
-    """Null space of the actuation matrix: ``actuation_null_space(q) -> N`` with B N = 0.
+    """Return the null space of the actuation matrix: ``actuation_null_space(q) -> N``, B N = 0.
 
     All motor efforts tau_m + N z produce the same motion. z is an internal load that may remove
     backlash or keep efforts within limits. Column j is a unit effort of one redundant motor and the
@@ -61,8 +61,8 @@ def actuation_null_space(system: System) -> Function:
         system: open or closed mechanism; q must close the loops.
 
     Returns:
-        Function of q (nq, 1); N (k, k - m) for k motors and m independent joints; no columns if
-        k = m.
+        Function of q (nq, 1); N (k, k - m) for k motors and m independent joints; no columns if k =
+        m.
     """
 
     def build() -> tuple[Named, Named]:
@@ -82,12 +82,21 @@ def actuation_null_space(system: System) -> Function:
 
 
 def motors_apart(system: System, s: ModelSymbols) -> bool:
-    """Whether motor efforts differ from efforts at the input velocities of a model."""
+    """Return whether the motor efforts of a model differ from efforts at its input velocities.
+
+    Args:
+        system: open or closed mechanism.
+        s: symbols of the model.
+    """
     return s.reduction is not None and system.motors != system.active
 
 
 def effort_input(system: System, s: ModelSymbols) -> tuple[str, SX, SX]:
-    """Input of efforts for a model.
+    """Return the effort input of a model, and the efforts at its input velocities.
+
+    Args:
+        system: open or closed mechanism.
+        s: symbols of the model.
 
     Returns:
         name of the input ("tau", "tau_a" or "tau_m"), its symbol, and the equivalent efforts (m, 1)
@@ -101,7 +110,7 @@ def effort_input(system: System, s: ModelSymbols) -> tuple[str, SX, SX]:
 
 
 def effort_output(system: System, s: ModelSymbols, tau: SX) -> tuple[str, SX]:
-    """Output of efforts of a model, distributed over the motors.
+    """Return the effort output of a model, distributed over the motors.
 
     Redundant motors get the efforts of smallest norm: tau_m = B' (B B')^-1 tau_a.
 
@@ -121,7 +130,13 @@ def effort_output(system: System, s: ModelSymbols, tau: SX) -> tuple[str, SX]:
 
 
 def shared_efforts(system: System, s: ModelSymbols, needed: SX) -> SX:
-    """(nv, 1) joint efforts of the motors that produce the same motion as `needed` (nv, 1)."""
+    """Return the joint efforts (nv, 1) of the motors that produce a motion.
+
+    Args:
+        system: open or closed mechanism.
+        s: symbols of the model.
+        needed: (nv, 1) joint efforts of the tree that the motion requires.
+    """
     tau = zeros(system.nv)
     tau[list(system.motors)] = effort_output(system, s, s.reduced_effort(needed))[1]
     return tau

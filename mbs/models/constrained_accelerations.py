@@ -36,7 +36,9 @@ def constrained_accelerations(
     a_p: SX | None = None,
     acting: SX | None = None,
 ) -> tuple[SX, SX, SX]:
-    """Accelerations of the tree and efforts of its constraints; links may be massless.
+    """Return the accelerations of the tree and the efforts of its constraints.
+
+    Links may be massless.
 
     Solves A a + H = tau + J' lam + E' tau_p with J a + psi = 0 and E a = a_p.
 
@@ -62,7 +64,12 @@ def constrained_accelerations(
 
 
 def unit_rows(system: System, numbers: Sequence[int]) -> SX:
-    """(k, nv) rows of the identity matrix for the given velocity indices."""
+    """Return rows (k, nv) of the identity matrix.
+
+    Args:
+        system: open or closed mechanism.
+        numbers: k indices in v.
+    """
     return SX(DM.eye(system.nv))[list(numbers), :]
 
 
@@ -73,7 +80,7 @@ def constrained(
     right: tuple[SX, SX, SX],
     acting: SX | None,
 ) -> tuple[SX, SX, SX]:
-    """Solve A x = b + J' y + E' z, J x = d, E x = e for x, y and z.
+    """Return the solution (x, y, z) of A x = b + J' y + E' z, J x = d, E x = e.
 
     Args:
         system: open or closed mechanism.
@@ -96,7 +103,14 @@ def constrained(
 
 
 def loop_rows(system: System, s: ModelSymbols) -> tuple[SX, SX]:
-    """Jacobian J (r, nv) and bias psi (r, 1) of the independent closure rows J a + psi = 0."""
+    """Return Jacobian J (r, nv) and bias psi (r, 1) of the closure rows J a + psi = 0.
+
+    Only independent rows are included. Both have no rows for an open system.
+
+    Args:
+        system: open or closed mechanism.
+        s: symbols of the system, in tree coordinates.
+    """
     if not system.is_closed:
         return SX(0, system.nv), SX(0, 1)
     J = independent_constraint_rows(system, s.q)
@@ -104,7 +118,15 @@ def loop_rows(system: System, s: ModelSymbols) -> tuple[SX, SX]:
 
 
 def inertia_size(system: System, A: SX, s: ModelSymbols) -> float:
-    """Mean diagonal element of A in the assembled configuration; 1 if a symbol has no default."""
+    """Return the mean diagonal element of A in the assembled configuration.
+
+    It is 1 if a symbol has no default, or the mean is not positive.
+
+    Args:
+        system: open or closed mechanism.
+        A: (nv, nv) inertia matrix of the tree.
+        s: symbols of the system.
+    """
     if any(p.default is None for p in system.parameters):
         return 1.0
     trace = casadi.Function("trace", [s.q, system.p], [casadi.trace(A)])
@@ -113,10 +135,13 @@ def inertia_size(system: System, A: SX, s: ModelSymbols) -> float:
 
 
 def every_velocity_moves_its_link(system: System) -> bool:
-    """Whether the mass matrix of the tree is known to be positive definite everywhere.
+    """Return whether the inertia matrix of the tree is known to be positive definite everywhere.
 
     Sufficient condition: each link has a physical inertia (not grouped base parameters) and its own
     positive inertia against the velocity of its joint. Descendants only increase the pivots.
+
+    Args:
+        system: open or closed mechanism.
     """
 
     def check() -> bool:
@@ -134,7 +159,7 @@ def every_velocity_moves_its_link(system: System) -> bool:
 
 
 def _is_tensor(J: NDArray[np.float64]) -> bool:
-    """Whether the symmetric matrix J (3, 3) has no negative eigenvalue, up to rounding."""
+    """Return whether the symmetric matrix J (3, 3) has no negative eigenvalue, up to rounding."""
     values = np.linalg.eigvalsh(J)
     return bool(values[0] >= -_ROUNDING * values[-1])
 

@@ -164,14 +164,19 @@ class Contacts:
         return len(self.names)
 
     def at(self, q: SX, v: SX) -> ContactState:
-        """Contact state at positions q (nq, 1) and velocities v (nv, 1)."""
+        """Return the contact state at positions and velocities.
+
+        Args:
+            q: (nq, 1) positions.
+            v: (nv, 1) velocities.
+        """
         names = [field.name for field in fields(ContactState)]
         values = [getattr(self.state, name) for name in names]
         put = casadi.substitute(values, [self.q, self.v], [casadi.densify(q), casadi.densify(v)])
         return ContactState(**dict(zip(names, put, strict=True)))
 
     def rows(self, q: SX) -> SX:
-        """(k, nv) Jacobian E of the contact velocities at positions q."""
+        """Return the Jacobian E (k, nv) of the contact velocities at positions q (nq, 1)."""
         (E,) = casadi.substitute([self.state.rows], [self.q], [casadi.densify(q)])
         return SX(E)
 
@@ -185,21 +190,32 @@ class Contacts:
         return DM(np.linalg.norm(self.levers, axis=1))
 
     def scaled_rows(self, q: SX) -> SX:
-        """(k, nv) Jacobian E with each row divided by its typical norm `sizes`."""
+        """Return the Jacobian E (k, nv) at positions q (nq, 1), with scaled rows.
+
+        Each row is divided by its typical norm in `sizes`.
+        """
         return casadi.mtimes(casadi.diag(1 / self.sizes), self.rows(q))
 
     def velocity(self, q: SX, v: SX) -> SX:
-        """(k, 1) slip velocities and gap rates."""
+        """Return the slip velocities and gap rates (k, 1) at positions q and velocities v."""
         return self.at(q, v).velocity
 
     def modes(self, values: SX) -> Modes:
-        """Split the mode vector (2 k, 1) into limits and sliding directions, and derive `stuck`."""
+        """Return the modes in a vector (2 k, 1): k limits, then k sliding directions.
+
+        `stuck` follows from them.
+
+        Args:
+            values: (2 k, 1) mode vector.
+        """
         limit, slide = values[: len(self)], values[len(self) :]
         sticks = self.has_friction * (slide == 0)
         return Modes(limit, slide, casadi.fmax(limit**2, sticks))
 
     def first(self, q: SX, v: SX) -> tuple[SX, SX]:
-        """Initial modes: rows at rest at a limit are in contact, moving rows with friction slide.
+        """Return the initial modes: rows at rest at a limit are in contact, moving rows slide.
+
+        Only rows with friction slide.
 
         Args:
             q: (nq, 1) positions.
@@ -224,24 +240,37 @@ class Contacts:
         return casadi.vertcat(at_limit, direction * self.has_friction), casadi.vertcat(*beyond)
 
     def distance(self, q: SX, limit: SX) -> SX:
-        """(k, 1) difference between each gap and its active limit; zero between limits."""
+        """Return the difference (k, 1) between each gap and its active limit; zero between limits.
+
+        Args:
+            q: (nq, 1) positions.
+            limit: (k, 1) active limit of each row: -1 lower, 1 upper, 0 none.
+        """
         if not any(stop is not None for stop in self.stops):
             return SX.zeros(len(self))
         gap = self.has_gap * self.at(q, SX.zeros(self.v.numel())).measure
         return casadi.if_else(limit == 0, 0, gap - casadi.if_else(limit < 0, *self.bounds))
 
     def efforts(self, state: ContactState, modes: Modes, y: SX) -> tuple[SX, SX]:
-        """Split the holding efforts y (k, 1) into efforts of stops and of friction, (k, 1) each.
+        """Return the efforts of stops and of friction, (k, 1) each.
 
-        Friction gets the effort up to its sticking limit, the stop the remainder: rigid bodies
-        leave this split undetermined.
+        Friction gets the holding effort up to its sticking limit, the stop the remainder: rigid
+        bodies leave this split undetermined.
+
+        Args:
+            state: current contact state.
+            modes: current modes.
+            y: (k, 1) efforts that hold the rows.
         """
         taken = casadi.fmax(casadi.fmin(y, state.sticking), -state.sticking)
         friction = casadi.if_else(modes.stuck, taken, -modes.slide * state.sliding)
         return modes.stuck * (y - taken), friction
 
     def indicators(self, state: ContactState, modes: Modes, y: SX, inertia: SX) -> SX:
-        """(5 k, 1) event indicators in the order of KINDS, positive between events.
+        """Return the event indicators (5 k, 1) of k contact rows, positive between events.
+
+        They are k indicators each of: lower limit, upper limit, holding effort too negative, too
+        positive, end of sliding (`KINDS`).
 
         Args:
             state: current contact state.
@@ -262,7 +291,7 @@ class Contacts:
 
 
 def contacts_of(system: System) -> Contacts:
-    """Collect the contact rows of the rigid stops and dry frictions of a system (cached).
+    """Return the contact rows of the rigid stops and dry frictions of a system (cached).
 
     Raises:
         ModelError: two stops act on one coordinate, or a sensor measures a force that contact
@@ -326,7 +355,10 @@ def require_undriven(system: System, contacts: Contacts, driven: Sequence[int]) 
 
 
 def _is_independent(system: System, contacts: Contacts, driven: Sequence[int], j: int) -> bool:
-    """Whether contact row j is independent of the prescribed motions, at the assembled position."""
+    """Return whether contact row j is independent of the prescribed velocities `driven`.
+
+    The rank is tested at the assembled configuration.
+    """
     number = contacts.velocities[j]
     if number is not None:
         return are_independent(system, (*driven, number))
@@ -336,7 +368,11 @@ def _is_independent(system: System, contacts: Contacts, driven: Sequence[int], j
 
 
 def require_lasting_rows(system: System, contacts: Contacts) -> None:
-    """Raise if there are contacts and the independent closure rows change with the configuration.
+    """Raise if there are contacts and the independent closure rows vary with the configuration.
+
+    Args:
+        system: open or closed mechanism.
+        contacts: contact rows of the system.
 
     Raises:
         ModelError: the message names the contact and the remedy.
@@ -386,12 +422,12 @@ def _contacts(system: System) -> Contacts:
             seen = at.at(part)
             laws = [*part.element.stops(seen).items(), *part.element.frictions(seen).items()]
             for label, law in laws:
-                _require_unread(system, part)
+                _require_no_wrench_sensor(system, part)
                 element = ContactElement(part, label, law, effort_unit(part, law))
                 _collect(system, found, element, q, v)
     found.sort(key=lambda row: system.nv if row.number is None else row.number)
     stops, frictions = (tuple(getattr(row, x) for row in found) for x in ("stop", "friction"))
-    measures = [_measure(row) for row in found]
+    measures = [_gap_or_velocity(row) for row in found]
     rows = SX(casadi.vertcat(SX(0, system.nv), *(row.E for row in found)))
     velocity = _stack(row.velocity for row in found)
     return Contacts(
@@ -402,17 +438,17 @@ def _contacts(system: System) -> Contacts:
         velocities=tuple(row.number for row in found),
         positions=tuple(_index(measure, q) for measure in measures),
         groups=tuple([row.key for row in found].index(row.key) for row in found),
-        levers=_levers(system, found, rows, q),
+        levers=_largest_jacobian(system, found, rows, q),
         stops=stops,
         frictions=frictions,
-        bounds=(_column(stops, "lower"), _column(stops, "upper")),
+        bounds=(_law_column(stops, "lower"), _law_column(stops, "upper")),
         has_lower=DM([float(x is not None and x.sides[0]) for x in stops]),
         has_upper=DM([float(x is not None and x.sides[1]) for x in stops]),
         has_friction=DM([float(x is not None) for x in frictions]),
         has_gap=DM([float(x is not None and isinstance(x.law, Stop)) for x in stops]),
-        restitution=_column(stops, "restitution"),
-        rest_speed=_column(stops, "rest_speed"),
-        anchors=tuple(_anchor(system, row, q, v) for row in found),
+        restitution=_law_column(stops, "restitution"),
+        rest_speed=_law_column(stops, "rest_speed"),
+        anchors=tuple(_row_integral(system, row, q, v) for row in found),
         q=q,
         v=v,
         state=ContactState(
@@ -420,14 +456,19 @@ def _contacts(system: System) -> Contacts:
             velocity=velocity,
             bias=SX(casadi.densify(casadi.jtimes(velocity, q, position_rate(system.tree, q, v)))),
             measure=_stack(SX(0) if x is None else x for x in measures),
-            sliding=_column(frictions, "limit"),
-            sticking=_column(frictions, "sticking", "limit"),
+            sliding=_law_column(frictions, "limit"),
+            sticking=_law_column(frictions, "sticking", "limit"),
         ),
     )
 
 
 def effort_unit(part: ComponentInstance, law: Friction | Stop | OneWay) -> str:
-    """Unit of the contact effort: that of the law, else of the coordinate, else N."""
+    """Return the unit of a contact effort: that of the law, else of the coordinate, else N.
+
+    Args:
+        part: component that has the contact.
+        law: contact law.
+    """
     if law.unit is not None:
         return law.unit
     return EFFORT_UNIT[part.levers[0].unit] if part.levers and not part.frames else "N"
@@ -436,7 +477,11 @@ def effort_unit(part: ComponentInstance, law: Friction | Stop | OneWay) -> str:
 def _collect(
     system: System, rows: list[_ContactRow], element: ContactElement, q: SX, v: SX
 ) -> None:
-    """Merge an element into an equal row without an element of its kind, or append a new row."""
+    """Add a contact element to a row with equal Jacobian, or append a new row, in place.
+
+    A row has at most one stop and one friction. Raise ModelError if nothing moves the element, or
+    two stops act on one coordinate.
+    """
     w = contact_velocity(system, element.law, q, v)
     E = SX(casadi.sparsify(casadi.jacobian(w, v)))
     at_rest = casadi.simplify(casadi.substitute(w, v, SX.zeros(system.nv)))
@@ -468,16 +513,23 @@ def _collect(
 
 
 def contact_velocity(system: System, law: Friction | Stop | OneWay, q: SX, v: SX) -> SX:
-    """(1, 1) slip velocity of a friction, gap rate of a stop, or velocity of a freewheel."""
+    """Return the contact velocity (1, 1): slip of a friction, gap rate, or freewheel velocity.
+
+    Args:
+        system: open or closed mechanism.
+        law: contact law.
+        q: (nq, 1) symbols of positions.
+        v: (nv, 1) symbols of velocities.
+    """
     if isinstance(law, Stop):
         return SX(casadi.jtimes(SX(law.gap), q, position_rate(system.tree, q, v)))
     return SX(law.slip if isinstance(law, Friction) else law.velocity)
 
 
-def _levers(system: System, found: Sequence[_ContactRow], rows: SX, q: SX) -> Array:
-    """Return the largest absolute elements (k, nv) of the contact rows over several configurations.
+def _largest_jacobian(system: System, found: Sequence[_ContactRow], rows: SX, q: SX) -> Array:
+    """Return the largest absolute elements (k, nv) of the contact rows over configurations.
 
-    These are the assembled configuration and random ones.
+    These are the assembled configuration and random ones. `rows` are the rows at the symbols q.
     """
     rng = np.random.default_rng(_SEED)
     p = [1.0 if x.default is None else x.default for x in system.parameters]
@@ -496,7 +548,7 @@ def _levers(system: System, found: Sequence[_ContactRow], rows: SX, q: SX) -> Ar
     return levers
 
 
-def _measure(row: _ContactRow) -> SX | None:
+def _gap_or_velocity(row: _ContactRow) -> SX | None:
     """Return the gap of a stop or the velocity of a freewheel in a row; None without either."""
     if row.stop is None:
         return None
@@ -512,7 +564,7 @@ def _index(value: SX | None, q: SX) -> int | None:
     return next((k for k, x in enumerate(elements) if casadi.is_equal(x, value)), None)
 
 
-def _anchor(system: System, row: _ContactRow, q: SX, v: SX) -> SX | None:
+def _row_integral(system: System, row: _ContactRow, q: SX, v: SX) -> SX | None:
     """Return an expression whose rate is the velocity of a contact row; None if unknown."""
     if row.stop is not None and isinstance(row.stop.law, Stop):
         return SX(row.stop.law.gap)
@@ -526,8 +578,8 @@ def _anchor(system: System, row: _ContactRow, q: SX, v: SX) -> SX | None:
     return sum((row.E[0, k] * q[x.q.start + k - x.v.start] for k, x in moved), SX(0))
 
 
-def _require_unread(system: System, part: ComponentInstance) -> None:
-    """Raise if a sensor measures joint wrenches while `part` has contacts between points."""
+def _require_no_wrench_sensor(system: System, part: ComponentInstance) -> None:
+    """Raise ModelError if a sensor measures joint wrenches and `part` has contacts on points."""
     for attached in system.sensors if part.frames else ():
         if attached.joint is not None:
             raise ModelError(
@@ -542,8 +594,8 @@ def _stack(values: Iterable[SX]) -> SX:
     return SX(casadi.densify(casadi.vertcat(SX(0, 1), *values)))
 
 
-def _column(elements: Sequence[ContactElement | None], *names: str) -> SX:
-    """Return (k, 1) the first named field of each law that is not None; 0 without a law."""
+def _law_column(elements: Sequence[ContactElement | None], *names: str) -> SX:
+    """Return (k, 1) of the first field in `names` of each law that is not None; 0 without a law."""
     values = []
     for element in elements:
         found = [getattr(element.law, name, None) for name in names] if element else []
@@ -555,7 +607,9 @@ def _column(elements: Sequence[ContactElement | None], *names: str) -> SX:
 
 
 def switched_dynamics(system: System, driven: tuple[int, ...]) -> Function:
-    """Hybrid dynamics: ``switched_dynamics(q, v, tau, a_p, acting) -> a, tau_p, inertia``.
+    """Return the hybrid dynamics with contact rows that can be switched on and off.
+
+    It is ``switched_dynamics(q, v, tau, a_p, acting) -> a, tau_p, inertia``.
 
     The m prescribed velocities and the k contact rows are constraints that inputs switch on or off.
 
@@ -585,7 +639,9 @@ def switched_dynamics(system: System, driven: tuple[int, ...]) -> Function:
         # diagonal element of the mass matrix
         least = SX(1e-6 * inertia_size(system, A, s))
         own = [
-            _row_inertia(A, rows[j, :]) / contacts.sizes[j] ** 2 if n is None else A[n, n]
+            A[n, n]
+            if n is not None
+            else casadi.mtimes(rows[j, :], casadi.mtimes(A, rows[j, :].T)) / contacts.sizes[j] ** 2
             for j, n in enumerate(contacts.velocities)
         ]
         inertia = casadi.vertcat(*(casadi.fmax(x, least) for x in own))
@@ -593,11 +649,6 @@ def switched_dynamics(system: System, driven: tuple[int, ...]) -> Function:
         return inputs, [("a", a), ("tau_p", tau_p / every), ("inertia", inertia)]
 
     return model_function(system, ("switched_dynamics", driven), build)
-
-
-def _row_inertia(A: SX, row: SX) -> SX:
-    """Return row A row': effective inertia along a row of about unit norm."""
-    return SX(casadi.mtimes(row, casadi.mtimes(A, row.T)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -634,7 +685,7 @@ class ContactEquations:
 def contact_equations(
     system: System, q: SX, v: SX, tau: SX, driven: Mapping[int, SX]
 ) -> ContactEquations | None:
-    """Accelerations, efforts and event indicators under contacts; None without contacts.
+    """Return accelerations, efforts and event indicators under contacts; None without contacts.
 
     Args:
         system: open or closed mechanism.
@@ -688,10 +739,12 @@ _ROUNDS = 8
 
 
 def impact(system: System, driven: tuple[int, ...]) -> Function:
-    """Velocity jump by impulses on chosen velocities: ``impact(q, dv_p, acting) -> dv, P``.
+    """Return the velocity jump by impulses on chosen velocities.
 
-    Solves A dv = J' Lambda + E' P with J dv = 0, and with E dv = dv_p on the rows whose `acting`
-    is 1. A is the mass matrix, J the closure Jacobian, E the rows of prescribed and contact
+    It is ``impact(q, dv_p, acting) -> dv, P``.
+
+    Solves A dv = J' Lambda + E' P with J dv = 0, and with E dv = dv_p on the rows whose `acting` is
+    1. A is the mass matrix, J the closure Jacobian, E the rows of prescribed and contact
     velocities.
 
     Source: Pfeiffer and Glocker 1996, section 6.2.
@@ -720,7 +773,7 @@ def impact(system: System, driven: tuple[int, ...]) -> Function:
 
 
 def tree_jump(system: System, contact: ContactEquations, x: SX, fired: SX) -> tuple[SX, SX]:
-    """State of the tree and modes after an event; see `jump`.
+    """Return the state of the tree and the modes after an event; see `jump`.
 
     Args:
         system: open or closed mechanism.
@@ -743,7 +796,7 @@ def jump(
     motion: tuple[SX, SX, SX],
     driven: tuple[int, ...],
 ) -> tuple[SX, SX]:
-    """Velocities and modes after an event.
+    """Return the velocities and modes after an event.
 
     An impact has priority. Each stop that is reached reverses its velocity by the restitution, and
     closed stops stay closed, unless the impulse would have to pull. Friction has no impulse; a row
@@ -794,7 +847,7 @@ def _unilateral(
     targets: tuple[SX, SX],
     driven: tuple[int, ...],
 ) -> tuple[SX, SX]:
-    """Velocity jump by impulses of stops that only push, and the stops that act.
+    """Return the velocity jump by impulses of stops that only push, and the stops that act.
 
     A stop that would have to pull is released, unless the row would separate more slowly than the
     slowest rebound: several contacts could otherwise push each other off without end. With very

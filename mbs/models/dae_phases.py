@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from numbers import Real
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi
 import numpy as np
@@ -107,7 +107,7 @@ class PointRows:
 
 
 def point_rows(system: System, s: ModelSymbols, points: Sequence[ContactPoint]) -> PointRows:
-    """Positions, velocities, Jacobian and bias accelerations of contact points.
+    """Return positions, velocities, Jacobian and bias accelerations of contact points.
 
     Args:
         system: open or closed mechanism.
@@ -134,7 +134,9 @@ def point_rows(system: System, s: ModelSymbols, points: Sequence[ContactPoint]) 
 
 
 def constrained_elements(modes: Sequence[str]) -> DM:
-    """(3 n, 1) flags: 1 for each point coordinate x, y, z that the plane constrains, else 0.
+    """Return flags (3 n, 1): 1 for each point coordinate that the plane constrains, else 0.
+
+    The coordinates of each point are x, y, z.
 
     Args:
         modes: mode of each point: "fixed", "sliding" or "" if it is free.
@@ -181,7 +183,7 @@ def modes_of(name: str, points: Sequence[ContactPoint], touching: Touching) -> t
         ModelError: a point is unknown or repeated, or its mode is unknown.
     """
     names = [point.name for point in points]
-    given = _ways_by_name(name, touching)
+    given = _modes_by_name(name, touching)
     for point, mode in given.items():
         if point not in names:
             raise ModelError(
@@ -196,8 +198,11 @@ def modes_of(name: str, points: Sequence[ContactPoint], touching: Touching) -> t
     return tuple(given.get(point, "") for point in names)
 
 
-def _ways_by_name(name: str, touching: Touching) -> dict[str, str]:
-    """Mode of each named point; names without a mode are "fixed". Raise if a name is repeated."""
+def _modes_by_name(name: str, touching: Touching) -> dict[str, str]:
+    """Return the mode of each touching point by name; "fixed" if no mode is given.
+
+    Raise ModelError, with the mechanism `name`, if a point is repeated.
+    """
     if isinstance(touching, Mapping):
         return dict(touching)
     alone = isinstance(touching, str) or not isinstance(touching, Iterable)
@@ -208,7 +213,7 @@ def _ways_by_name(name: str, touching: Touching) -> dict[str, str]:
 
 
 def friction_cone(name: str, points: Sequence[ContactPoint], sides: int | None) -> Function:
-    """Friction cone margins ``cone(f) -> margin``; see `ContactPhases.friction`.
+    """Return the friction cone margins ``cone(f) -> margin``; see `ContactPhases.friction`.
 
     Args:
         name: name of the mechanism, for error messages.
@@ -224,14 +229,17 @@ def friction_cone(name: str, points: Sequence[ContactPoint], sides: int | None) 
         )
     f = SX.sym("f", 3, len(points))
     margins = [
-        casadi.vertcat(f[2, k], _slip(f[:, k], point.friction, sides))
+        casadi.vertcat(f[2, k], _cone_margin(f[:, k], point.friction, sides))
         for k, point in enumerate(points)
     ]
     return Function("cone", [f], [casadi.densify(casadi.vertcat(*margins))], ["f"], ["margin"])
 
 
-def _slip(f: SX, friction: float | None, sides: int | None) -> SX:
-    """Margin of a contact force to its friction cone, or one margin per side of the pyramid."""
+def _cone_margin(f: SX, friction: float | None, sides: int | None) -> SX:
+    """Return the margin of a contact force f (3, 1) to its friction cone.
+
+    With a pyramid, it is one margin per side. Empty (0, 1) without a friction coefficient.
+    """
     if friction is None:
         return SX(0, 1)
     if sides is None:
@@ -289,10 +297,13 @@ class Standing:
         return ", ".join(p.name for p, mode in zip(self.points, self.modes, strict=True) if mode)
 
     def rows(self, kept: tuple[int, ...]) -> ConstraintRows:
-        """Return a callable (s, a) -> constraint rows of the kept point coordinates.
+        """Return a callable (symbols, accelerations) -> constraint rows of point coordinates.
 
         Distances are position constraints and come first. Coordinates in the plane are velocity
         constraints.
+
+        Args:
+            kept: indices of the point coordinates, see `constrained`.
         """
         distances, drifts = split(kept)
         order = [*distances, *drifts]
@@ -311,7 +322,11 @@ class Standing:
         return rows
 
     def elements(self, kept: tuple[int, ...]) -> tuple[Elements, Elements]:
-        """Name and unit of each position constraint, then of each velocity constraint."""
+        """Return (name, unit) of the position constraints, and of the velocity constraints.
+
+        Args:
+            kept: indices of the point coordinates, see `constrained`.
+        """
         distances, drifts = (
             tuple((f"{self.points[k // 3].name}: {'xyz'[k % 3]}", "m") for k in part)
             for part in split(kept)
@@ -319,15 +334,19 @@ class Standing:
         return distances, drifts
 
     def independent(self, q: Array, p: Array) -> tuple[int, ...]:
-        """Indices of constrained point coordinates that are independent of loops and each other.
+        """Return the indices of constrained point coordinates that are independent.
 
-        The rank is the largest rank near q. Rows that are dependent only at q, for instance at a
-        straight leg, are kept.
+        They are independent of each other and of the loops. The rank is the largest rank near q.
+        Rows that are dependent only at q, for instance at a straight leg, are kept.
+
+        Args:
+            q: (nq,) start positions.
+            p: (np,) parameters.
         """
         constrained, loops = self.constrained, kept_rows(self.system)
-        numbers = _numbers(self)
+        numbers = _phase_terms(self)
         matrices = []
-        for configuration in self._near(q, p):
+        for configuration in self._nearby_closed(q, p):
             _, _, J_loops, _, J, _ = (np.array(x) for x in numbers(configuration, 0 * q[:1], p))
             matrices.append(np.vstack([J_loops[loops], J[constrained]]))
         ranks = [rank(matrix) for matrix in matrices]
@@ -336,10 +355,10 @@ class Standing:
         chosen = independent_rows(best, max(ranks), first)
         return tuple(constrained[k - len(loops)] for k in chosen if k >= len(loops))
 
-    def _near(self, q: Array, p: Array) -> Iterator[Array]:
-        """Yield q, then nearby configurations that satisfy the contacts and the loops."""
+    def _nearby_closed(self, q: Array, p: Array) -> Iterator[Array]:
+        """Yield q (nq,), then nearby configurations that satisfy the contacts and the loops."""
         yield q
-        rng, function = np.random.default_rng(_SEED), _touching(self)
+        rng, function = np.random.default_rng(_SEED), _touch_residuals(self)
 
         def residual(x: Array) -> tuple[Array, Array]:
             return _pair(function(x, p))
@@ -350,7 +369,10 @@ class Standing:
                 yield root.x
 
     def start(self, begin: PhaseStart) -> tuple[Array, Array]:
-        """Consistent start: positions (nq,) and velocities (nv,) that satisfy contacts and loops.
+        """Return positions (nq,) and velocities (nv,) that satisfy contacts and loops.
+
+        Args:
+            begin: start values of the user.
 
         Raises:
             Unclosable: no configuration with the given positions satisfies the contacts.
@@ -362,14 +384,14 @@ class Standing:
         q0 = system.plain_names({} if begin.q0 is None else begin.q0, POSITIONS)
         given = q0 if isinstance(q0, Mapping) else names
         free = [k for k, name in enumerate(names) if name not in given]
-        function = _touching(self)
+        function = _touch_residuals(self)
 
         def residual(x: Array) -> tuple[Array, Array]:
-            r, J = _pair(function(_with(q, free, x), p))
+            r, J = _pair(function(_with_values(q, free, x), p))
             return r, J[:, free]
 
         if free:
-            q = _with(q, free, gauss_newton(residual, q[free]).x)
+            q = _with_values(q, free, gauss_newton(residual, q[free]).x)
         missing = _pair(function(q, p))[0]
         if np.abs(missing).max(initial=0) > _OFF:
             raise Unclosable(
@@ -380,11 +402,11 @@ class Standing:
         return q, self._velocity(q, p, begin.v0)
 
     def _velocity(self, q: Array, p: Array, v0: Values) -> Array:
-        """Return the smallest velocities (nv,) that keep loops and contacts closed.
+        """Return the smallest velocities (nv,) that satisfy loops and contacts and agree with v0.
 
-        They agree with v0, velocities by name or all of them.
+        v0 are velocities by name or all of them. Raise ModelError if they are not possible.
         """
-        _, _, J_loops, _, J, _ = (np.array(x) for x in _numbers(self)(q, np.zeros(1), p))
+        _, _, J_loops, _, J, _ = (np.array(x) for x in _phase_terms(self)(q, np.zeros(1), p))
         rows = np.vstack([J_loops, J[self.constrained]])
         v, missed = smallest_velocity(self.system, rows, v0)
         if missed:
@@ -397,7 +419,13 @@ class Standing:
     def efforts(
         self, kept: tuple[int, ...], motion: tuple[Array, Array], tau: Array, p: Array
     ) -> Array:
-        """Initial [a; lam] of form "index1": accelerations (nv,) and efforts of loops and contacts.
+        """Return the initial [a; lam] of form "index1": accelerations and row efforts.
+
+        Args:
+            kept: indices of the point coordinates whose rows are kept.
+            motion: positions (nq,) and velocities (nv,).
+            tau: (nv,) joint efforts.
+            p: (np,) parameters.
 
         Raises:
             ModelError: the equations are contradictory at this configuration, such as with a
@@ -406,7 +434,7 @@ class Standing:
         q, v = motion
         distances, drifts = split(kept)
         s = len(self.system.closure.rows) if self.system.closure else 0
-        A, H, J_loops, psi, J, bias = (np.array(x) for x in _numbers(self)(q, v, p))
+        A, H, J_loops, psi, J, bias = (np.array(x) for x in _phase_terms(self)(q, v, p))
         loops = kept_rows(self.system)
         J_loops, psi = J_loops[loops], psi[loops]
         rows = np.vstack([J_loops[:s], J[distances], J_loops[s:], J[drifts]])
@@ -426,12 +454,16 @@ class Standing:
 
 
 def split(kept: tuple[int, ...]) -> tuple[list[int], list[int]]:
-    """Split indices of point coordinates into distances (z) and coordinates in the plane (x, y)."""
+    """Return the indices of distances (z) and of coordinates in the plane (x, y).
+
+    Args:
+        kept: indices of point coordinates, three per point.
+    """
     return [k for k in kept if k % 3 == 2], [k for k in kept if k % 3 != 2]
 
 
-def _numbers(standing: Standing) -> Function:
-    """Function ``numbers(q, v, p) -> A, H, J_loops, psi, J, bias``: all rows of loops and points.
+def _phase_terms(standing: Standing) -> Function:
+    """Return ``numbers(q, v, p) -> A, H, J_loops, psi, J, bias``, with all rows.
 
     Outputs: mass matrix, bias efforts, Jacobian and acceleration bias of loops and of points.
     """
@@ -455,7 +487,12 @@ def _numbers(standing: Standing) -> Function:
 
 
 def with_starts(system: System, values: Sequence[SX]) -> list[SX]:
-    """Substitute start values of component states and default component inputs in expressions."""
+    """Return expressions with start values of component states and default component inputs.
+
+    Args:
+        system: open or closed mechanism.
+        values: expressions that may contain `system.z` and `system.u`.
+    """
     signals = casadi.vertcat(system.z, system.u)
     if not signals.numel():
         return list(values)
@@ -463,10 +500,10 @@ def with_starts(system: System, values: Sequence[SX]) -> list[SX]:
     return [SX(value) for value in casadi.substitute(list(values), [signals], [numbers])]
 
 
-def _touching(standing: Standing) -> Function:
-    """Function ``touching(q, p) -> r, J``: residuals of contacts, quaternions and loops.
+def _touch_residuals(standing: Standing) -> Function:
+    """Return ``touching(q, p) -> r, J``: residuals of contacts, quaternions and loops.
 
-    r is zero if the points touch, quaternions have unit norm and loops close; J is dr/dq.
+    r is zero if the points touch, quaternions have unit norm and loops close. J is dr/dq.
     """
     system = standing.system
 
@@ -490,7 +527,7 @@ def _pair(results: Any) -> tuple[Array, Array]:
     return np.array(r).ravel(), np.array(J)
 
 
-def _with(q: Array, places: list[int], values: Array) -> Array:
+def _with_values(q: Array, places: list[int], values: Array) -> Array:
     """Return a copy of q with `values` at the indices `places`."""
     result = q.copy()
     result[places] = values
@@ -503,17 +540,11 @@ class PhaseDae(Dae):
 
     Attributes:
         f: (3, n) forces of the planes on the points, in the axes of the planes, as expressions of
-            x, z, u and p; zero for free points.
+            x, z, u and p; zero for free points. It is also the last output of `function`.
     """
 
+    _outputs: ClassVar[tuple[str, ...]] = (*Dae._outputs, "f")
     f: SX
-
-    def function(self) -> Function:
-        """Function ``dae(x, z, u, p) -> ode, alg, invariants, q, v, f`` of numbers, SX or MX."""
-        inputs = ("x", "z", "u", "p")
-        outputs = ("ode", "alg", "invariants", "q", "v", "f")
-        given, results = ([getattr(self, n) for n in names] for names in (inputs, outputs))
-        return Function("dae", given, results, list(inputs), list(outputs), {"cse": True})
 
 
 def phase_dae(standing: Standing, explicit: Function, form: str, begin: PhaseStart) -> PhaseDae:
@@ -524,6 +555,10 @@ def phase_dae(standing: Standing, explicit: Function, form: str, begin: PhaseSta
         explicit: forward dynamics of the phase, `ContactPhases.accelerations`.
         form: form of the equations, see `mbs.models.dae`.
         begin: start values of the user.
+
+    Raises:
+        ModelError: the form is unknown, or the start is not possible.
+        Unclosable: no configuration lets all touching points touch.
     """
     system = standing.system
     if form not in FORMS:
@@ -567,7 +602,7 @@ def _built(standing: Standing, explicit: Function, form: str, kept: tuple[int, .
     def build() -> _Built:
         names = standing.elements(kept)
         if form == "reduced":
-            made, f = _explicit(standing, explicit, kept)
+            made, f = _explicit_equations(standing, explicit, kept)
             return made, f, elements_of(system, "phase", names)
         made = implicit(system, form, standing.rows(kept))
         return made, _forces(standing, kept, made.z), elements_of(system, form, names)
@@ -577,10 +612,13 @@ def _built(standing: Standing, explicit: Function, form: str, kept: tuple[int, .
     return built
 
 
-def _explicit(
+def _explicit_equations(
     standing: Standing, explicit: Function, kept: tuple[int, ...]
 ) -> tuple[DaeEquations, SX]:
-    """Explicit equations (x = [q; v; component states], no z) and forces f of the planes."""
+    """Return explicit equations of a phase (no z), and the forces f (3, n) of the planes.
+
+    x is [q; v; component states].
+    """
     system = standing.system
     s = symbols_of(system, "tree")
     require_no_later(system)
@@ -599,7 +637,7 @@ def _explicit(
 
 
 def _forces(standing: Standing, kept: tuple[int, ...], z: SX) -> SX:
-    """(3, n) forces of the planes on the points, taken from lam in z = [a; lam; mu]."""
+    """Return the forces (3, n) of the planes on the points, from lam in z = [a; lam; mu]."""
     closure, (distances, drifts) = standing.system.closure, split(kept)
     loops, slips = (len(closure.rows), len(closure.slips)) if closure else (0, 0)
     first = standing.system.nv + loops

@@ -59,7 +59,12 @@ Blocks = dict[str, SX]
 
 
 def efforts_by_ad(system: System, s: ModelSymbols, a: SX) -> tuple[Blocks, SX]:
-    """Derivatives of inverse dynamics by algorithmic differentiation of the recursion.
+    """Return the derivatives of inverse dynamics by algorithmic differentiation.
+
+    Args:
+        system: open or closed mechanism.
+        s: symbols of the system.
+        a: (m, 1) symbols of accelerations.
 
     Returns:
         blocks "q", "v" and "a" (m, m); efforts (m, 1).
@@ -74,7 +79,12 @@ def efforts_by_ad(system: System, s: ModelSymbols, a: SX) -> tuple[Blocks, SX]:
 
 
 def efforts_by_recursion(system: System, s: ModelSymbols, a: SX) -> tuple[Blocks, SX]:
-    """Derivatives of inverse dynamics by analytical recursions, for tree coordinates.
+    """Return the derivatives of inverse dynamics by analytical recursions, in tree coordinates.
+
+    Args:
+        system: open or closed mechanism.
+        s: symbols of the system, in tree coordinates.
+        a: (nv, 1) symbols of accelerations.
 
     Returns:
         blocks "q", "v" and "a" (nv, nv); efforts (nv, 1).
@@ -94,7 +104,9 @@ def efforts_by_recursion(system: System, s: ModelSymbols, a: SX) -> tuple[Blocks
 def implicit_formula(
     system: System, s: ModelSymbols, tau: SX, names: Collection[str]
 ) -> tuple[TreeFactor, SX, Blocks]:
-    """Linear systems A x = -dtau/dname whose solutions are the derivatives of accelerations.
+    """Return the linear systems whose solutions are the derivatives of accelerations.
+
+    They are A x = -dtau/dname for each input name.
 
     Args:
         system: open or closed mechanism.
@@ -121,7 +133,17 @@ def implicit_formula(
 def accelerations_by_efforts(
     system: System, s: ModelSymbols, tau: SX, names: tuple[str, ...]
 ) -> tuple[Blocks, SX]:
-    """Derivatives of forward dynamics by the implicit formula, and the accelerations (m, 1)."""
+    """Return the derivatives of forward dynamics by the implicit formula, and the accelerations.
+
+    Args:
+        system: open or closed mechanism.
+        s: symbols of the system.
+        tau: (m, 1) symbols of efforts.
+        names: inputs of the derivatives, among "q", "v", "tau", "z", "u" and "p".
+
+    Returns:
+        derivatives by input name, and accelerations (m, 1).
+    """
     wanted = [name for name in names if name != "tau"]
     factor, a, right = implicit_formula(system, s, tau, wanted)
     sides = [*right.values(), casadi.densify(SX.eye(s.size))]
@@ -135,7 +157,17 @@ def accelerations_by_efforts(
 def accelerations_by_ad(
     system: System, s: ModelSymbols, tau: SX, names: tuple[str, ...]
 ) -> tuple[Blocks, SX]:
-    """Derivatives of forward dynamics by algorithmic differentiation, and the accelerations."""
+    """Return the derivatives of forward dynamics by algorithmic differentiation, and a.
+
+    Args:
+        system: open or closed mechanism.
+        s: symbols of the system.
+        tau: (m, 1) symbols of efforts.
+        names: inputs of the derivatives, among "q", "v", "tau", "z", "u" and "p".
+
+    Returns:
+        derivatives by input name, and accelerations (m, 1).
+    """
     a = outputs_of(system, independent_dynamics(system), s.q, s.v, tau)[0]
     blocks = {
         "q": _along_motion(system, s, a),
@@ -146,7 +178,7 @@ def accelerations_by_ad(
 
 
 def _by_symbols_of(system: System, value: SX, names: Collection[str]) -> Blocks:
-    """Derivatives with respect to component states z, component inputs u or parameters p.
+    """Return the derivatives with respect to component states z, inputs u or parameters p.
 
     Names other than "z", "u" and "p" are ignored.
     """
@@ -155,7 +187,10 @@ def _by_symbols_of(system: System, value: SX, names: Collection[str]) -> Blocks:
 
 
 def _along_motion(system: System, s: ModelSymbols, value: SX) -> SX:
-    """Derivative of a value (k, 1) along unit input velocities: d(value)/dq dq/dv, (k, m)."""
+    """Return the derivative (k, m) of a value (k, 1) along unit input velocities.
+
+    It is d(value)/dq dq/dv.
+    """
     slope = casadi.jacobian(value, s.q)
     if system.nq != system.nv:
         u = SX.sym("u", system.nv)
@@ -169,7 +204,9 @@ def _along_motion(system: System, s: ModelSymbols, value: SX) -> SX:
 
 
 def solve_column(before: list[int]) -> Function:
-    """Solve A x = right for one column: ``solve_column(ratios, inverse, right) -> x``.
+    """Return the Function that solves A x = right for one column.
+
+    It is ``solve_column(ratios, inverse, right) -> x``.
 
     Args:
         before: index of the nearest ancestor of each row of A, or -1; see `factorize`.
@@ -183,7 +220,9 @@ def solve_column(before: list[int]) -> Function:
 
 
 def staged_accelerations(system: System, names: Sequence[str]) -> tuple[dict[str, MX], list[MX]]:
-    """Derivatives of forward dynamics in tree coordinates, as an MX graph with mapped columns.
+    """Return the derivatives of forward dynamics in tree coordinates, as an MX graph.
+
+    The columns of the solution are mapped.
 
     Args:
         system: open mechanism.
@@ -195,7 +234,7 @@ def staged_accelerations(system: System, names: Sequence[str]) -> tuple[dict[str
     """
     solve = solve_column(velocity_antecedents(system.tree))
     order = [name for name in names if name != "tau"]
-    front = _front(system, order)
+    front = _first_stage(system, order)
     inputs = {name: MX.sym(name, front.size_in(name)) for name in front.name_in()}
     ratios, inverse, a, *right = front.call(list(inputs.values()))
     if "tau" in names:
@@ -210,8 +249,8 @@ def staged_accelerations(system: System, names: Sequence[str]) -> tuple[dict[str
     return inputs, [*(blocks[name] for name in names), a]
 
 
-def _front(system: System, names: Sequence[str]) -> Function:
-    """Return Function of q, v, tau: factors of A, accelerations, and right-hand sides.
+def _first_stage(system: System, names: Sequence[str]) -> Function:
+    """Return the Function (q, v, tau) -> factors of A, accelerations, right-hand sides.
 
     The derivatives of the accelerations are the solutions for these right-hand sides.
     """
@@ -245,7 +284,7 @@ def inverse_dynamics_derivatives(
     coordinates: str = "independent",
     with_respect_to: Iterable[str] = ("q", "v", "a"),
 ) -> Function:
-    """Derivatives of inverse dynamics with respect to motion, states and parameters.
+    """Return the derivatives of inverse dynamics by motion, states and parameters.
 
     ``idm_derivatives(q, v, a) -> dtau_dq, dtau_dv, dtau_da, tau``. Column k of dtau_dq is the rate
     of the efforts if the positions move with unit velocity k, dq/dt = `system.qdot(q, v)`, while v
@@ -273,7 +312,7 @@ def inverse_dynamics_derivatives(
             or the analytical method is requested in independent coordinates of a closed system.
     """
     require_system(system)
-    names = _checked(system, coordinates, with_respect_to, ("q", "v", "a", "z", "u", "p"))
+    names = _checked_names(system, coordinates, with_respect_to, ("q", "v", "a", "z", "u", "p"))
     _check_method(system, coordinates, method, ("auto", "ad", "analytical"))
 
     def build(chosen: str) -> Function:
@@ -290,7 +329,9 @@ def inverse_dynamics_derivatives(
         check = derivatives_check(system, coordinates)
         return model_function(system, key, symbols, check, TreeLoops(system, "idm_derivatives"))
 
-    candidates = ("ad",) if is_reduced(system, coordinates) else _compare(system, "analytical")
+    candidates = (
+        ("ad",) if is_reduced(system, coordinates) else _compared_methods(system, "analytical")
+    )
     return _choose(system, ("idm_derivatives", coordinates, names), method, build, candidates)
 
 
@@ -300,7 +341,9 @@ def direct_dynamics_derivatives(
     coordinates: str = "independent",
     with_respect_to: Iterable[str] = ("q", "v", "tau"),
 ) -> Function:
-    """Derivatives of forward dynamics: ``ddm_derivatives(q, v, tau) -> da_dq, da_dv, da_dtau, a``.
+    """Return the derivatives of forward dynamics.
+
+    They are ``ddm_derivatives(q, v, tau) -> da_dq, da_dv, da_dtau, a``.
 
     The accelerations solve tau = idm(q, v, a). So da_dq = -A^-1 dtau_dq and da_dv = -A^-1 dtau_dv
     with the derivatives of idm at these accelerations, and da_dtau = A^-1. A is factorised once.
@@ -328,7 +371,7 @@ def direct_dynamics_derivatives(
             or tree coordinates are requested of a closed system; or a joint moves no inertia.
     """
     require_system(system)
-    names = _checked(system, coordinates, with_respect_to, ("q", "v", "tau", "z", "u", "p"))
+    names = _checked_names(system, coordinates, with_respect_to, ("q", "v", "tau", "z", "u", "p"))
     if coordinates == "tree" and system.is_closed:
         raise ModelError(
             f"{system.name}: ddm_derivatives of a closed system are in its independent"
@@ -349,17 +392,17 @@ def direct_dynamics_derivatives(
 
         key = ("ddm_derivatives", chosen, coordinates, names)
         if chosen == "implicit" and not system.is_closed and system.nv >= _STAGED:
-            staged: Function = system.cached(key, lambda: _stage(system, names))
+            staged: Function = system.cached(key, lambda: _mapped_derivatives(system, names))
             return staged
         check = derivatives_check(system, coordinates)
         return model_function(system, key, symbols, check, TreeLoops(system, "ddm_derivatives"))
 
-    candidates = ("implicit",) if system.is_closed else _compare(system, "implicit")
+    candidates = ("implicit",) if system.is_closed else _compared_methods(system, "implicit")
     return _choose(system, ("ddm_derivatives", coordinates, names), method, build, candidates)
 
 
-def _stage(system: System, names: tuple[str, ...]) -> Function:
-    """Build ``ddm_derivatives`` of a large tree with mapped columns."""
+def _mapped_derivatives(system: System, names: tuple[str, ...]) -> Function:
+    """Return ``ddm_derivatives`` of a large tree with mapped columns, for the inputs `names`."""
     inputs, outputs = staged_accelerations(system, names)
     labels = list(inputs), [*(f"da_d{name}" for name in names), "a"]
     options = {"default_in": default_in(system, len(inputs.keys() - {"p"}))}
@@ -367,10 +410,13 @@ def _stage(system: System, names: tuple[str, ...]) -> Function:
     return ModelFunction(function, system, loops=TreeLoops(system, "ddm_derivatives"))
 
 
-def _checked(
+def _checked_names(
     system: System, coordinates: str, with_respect_to: Iterable[str], known: tuple[str, ...]
 ) -> tuple[str, ...]:
-    """Return the names of the inputs of the requested derivatives. Raise ModelError if invalid."""
+    """Return the names of the inputs of the requested derivatives, as a tuple.
+
+    Raise ModelError if a name is not in `known`, is repeated, or the system has no such input.
+    """
     check_coordinates(system, coordinates)
     given = [with_respect_to] if isinstance(with_respect_to, str) else list(with_respect_to)
     for name in given:
@@ -398,7 +444,7 @@ def _checked(
 
 
 def _check_method(system: System, coordinates: str, method: str, known: tuple[str, ...]) -> None:
-    """Raise ModelError if a method is unknown, or "analytical" for a system with loops."""
+    """Raise ModelError if a method is not in `known`, or is "analytical" for loops."""
     if method not in known:
         words = ", ".join(map(repr, known))
         raise ModelError(f"{system.name}: method is {quoted(method)}; use one of {words}")
@@ -409,8 +455,8 @@ def _check_method(system: System, coordinates: str, method: str, known: tuple[st
         )
 
 
-def _compare(system: System, recursive: str) -> tuple[str, ...]:
-    """Candidates of "auto": the given method, and "ad" for trees with short branches."""
+def _compared_methods(system: System, recursive: str) -> tuple[str, ...]:
+    """Return the methods that "auto" compares: `recursive`, and "ad" if branches are short."""
     behind: list[int] = []
     for link in system.tree.links:
         before = behind[link.antecedent] if link.antecedent >= 0 else 0
@@ -425,7 +471,7 @@ def _choose(
     build: Callable[[str], Function],
     candidates: tuple[str, ...],
 ) -> Function:
-    """Build the model by a method; for "auto" return the candidate with the fewest operations."""
+    """Return the model by a method, built by `build`; for "auto" the cheapest of `candidates`."""
     if method != "auto":
         return build(method)
     function: Function = system.cached(
@@ -435,7 +481,7 @@ def _choose(
 
 
 def _outputs(of: str, s: ModelSymbols, names: tuple[str, ...], blocks: Blocks, value: SX) -> Named:
-    """Return named derivatives "d<of>_d<name>", followed by the value itself."""
+    """Return named derivatives "d<of>_d<name>", followed by the value itself with name `of`."""
     labels = [name if name in "zup" else name + s.suffix for name in names]
     pairs = zip(labels, names, strict=True)
     return [*((f"d{of}_d{label}", blocks[name]) for label, name in pairs), (of, value)]
@@ -464,7 +510,7 @@ def with_implicit_jacobian(system: System, ddm: Function) -> Function:
         ModelError: the system has loops, or ddm is not the forward dynamics of the system.
     """
     require_system(system)
-    _check(system, ddm)
+    _require_ddm(system, ddm)
     names, symbols, output = ddm.name_in(), ddm.sx_in(), ddm.name_out()[0]
     q = symbols[0]
     arguments = [normalised(system.tree, q), *symbols[1:]]
@@ -492,8 +538,8 @@ def with_implicit_jacobian(system: System, ddm: Function) -> Function:
     return made
 
 
-def _check(system: System, ddm: Function) -> None:
-    """Raise ModelError unless `ddm` is the direct dynamic model of an open chain."""
+def _require_ddm(system: System, ddm: Function) -> None:
+    """Raise ModelError unless `ddm` is the direct dynamic model of this open chain."""
     if system.is_closed:
         raise ModelError(
             f"{system.name}: the implicit Jacobian is for open chains and this system has loops;"
@@ -509,7 +555,7 @@ def _check(system: System, ddm: Function) -> None:
 
 
 def _velocities(system: System, q: SX) -> SX:
-    """(nv, nq) map from changes of q, projected on motions, to velocities.
+    """Return the map (nv, nq) from changes of q, projected on motions, to velocities.
 
     It is the pseudoinverse of N in dq/dt = N v, divided by the norm of a quaternion. Columns of N
     are orthogonal. Their norm is 1/2 for a rotation (orthogonal to the quaternion) and 1 for a

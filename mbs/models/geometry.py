@@ -19,7 +19,7 @@ from mbs.recursions.route import cheapest_pose
 
 
 def transform(system: System, frame: str | int, relative_to: str | int = "base") -> Function:
-    """Pose of a frame relative to another frame: ``transform(q) -> T``.
+    """Return the pose of a frame relative to another frame: ``transform(q) -> T``.
 
     Source: Khalil & Creusot 1997, eq. 1.
 
@@ -42,7 +42,7 @@ def transform(system: System, frame: str | int, relative_to: str | int = "base")
 def _pose(
     system: System, key: tuple[str | int, ...], frame: str | int, relative_to: str | int
 ) -> Function:
-    """Return ``(q) -> T``: pose (4, 4) of a frame relative to the frame `relative_to`.
+    """Return the Function ``(q) -> T``: pose (4, 4) of a frame relative to another frame.
 
     Args:
         system: mechanism.
@@ -61,10 +61,14 @@ def _pose(
 
 
 def terminal_frame(system: System) -> str | int:
-    """Default frame of a robot (end effector).
+    """Return the default frame of a robot (end effector), a name or the index of a link.
 
-    The frame or body named "tool"; else the only named frame, not counting the frames "outer_world"
-    that mounts refer to; else the last link at the end of an open branch; else the last link.
+    It is the frame or body named "tool"; else the only named frame, not counting the frames
+    "outer_world" that mounts refer to; else the last link at the end of an open branch; else the
+    last link.
+
+    Args:
+        system: open or closed mechanism.
     """
     named = [name for name in system.named_frames if name.rpartition(".")[2] != OUTER_WORLD]
     if "tool" in system.frames:
@@ -91,7 +95,7 @@ def _open_ends(system: System) -> set[int]:
 
 
 def direct_geometry(system: System, frame: str | int | None = None) -> Function:
-    """Pose of a frame relative to the base (forward kinematics): ``dgm(q) -> T``.
+    """Return the pose of a frame relative to the base (forward kinematics): ``dgm(q) -> T``.
 
     For a closed system the input is q_a, the positions of the independent joints. Other positions
     follow on the branch of the assembled configuration: in closed form if `mbs.loops.function` has
@@ -124,7 +128,8 @@ def direct_geometry(system: System, frame: str | int | None = None) -> Function:
 def _closed_geometry(system: System, name: str | int, pose: Function) -> Function:
     """Return ``(q_a) -> T`` for a system with loops: closed form of the loops, then the pose.
 
-    Without a closed form, the loops are solved by continuation.
+    Without a closed form, the loops are solved by continuation. `name` is the frame, and `pose` its
+    pose as a Function of q.
     """
     try:
         loops = closed_form(system)
@@ -157,7 +162,10 @@ class _FollowedGeometry(LoopFunction):
 
 
 def _followed_geometry(system: System, name: str | int, pose: Function) -> Function:
-    """Return ``(q_a) -> T`` with the loops solved by continuation from the assembled position."""
+    """Return ``(q_a) -> T`` with the loops solved by continuation from the assembled position.
+
+    `name` is the frame, and `pose` its pose as a Function of q.
+    """
 
     def make() -> Function:
         follow = follow_active(system)

@@ -52,7 +52,11 @@ class Selection:
         return DETERMINED if self.reduced else None
 
     def of(self, system: System) -> tuple[SX, SquareJacobian]:
-        """Return symbols q (nq, 1) and the block form of the matrix at q (cached)."""
+        """Return symbols q (nq, 1) and the matrix at q in block triangular form (cached).
+
+        Args:
+            system: open or closed mechanism.
+        """
         found: tuple[SX, SquareJacobian] = system.cached(
             ("square_jacobian", self), lambda: self._form(system)
         )
@@ -70,7 +74,12 @@ class Selection:
         return q, square_jacobian(target, self.rows, self.columns, G)
 
     def regular(self, system: System) -> tuple[SX, SquareJacobian]:
-        """Return q and the block form as `of`, for a matrix that is invertible.
+        """Return symbols q (nq, 1) and the matrix at q, which must be invertible.
+
+        It is in block triangular form.
+
+        Args:
+            system: open or closed mechanism.
 
         Raises:
             ModelError: the matrix is singular in every configuration.
@@ -85,7 +94,11 @@ class Selection:
         return q, square
 
     def determinant(self, system: System) -> Function:
-        """Function ``determinant(q) -> det`` of the selected submatrix."""
+        """Return the Function ``determinant(q) -> det`` of the selected submatrix.
+
+        Args:
+            system: open or closed mechanism.
+        """
 
         def build() -> tuple[Named, Named]:
             q, square = self.of(system)
@@ -102,9 +115,15 @@ def selection(
     expressed_in: str | int,
     coordinates: str,
 ) -> Selection:
-    """Check the arguments of a user and return the selected square submatrix.
+    """Return the square submatrix that a user selects, after checking the arguments.
 
-    By default all rows, and as columns the velocities that move the frame.
+    Args:
+        system: open or closed mechanism.
+        frame: name of a body or frame, or index of a link.
+        rows: rows of [V; w], indices 0 to 5 or names "Vx" to "wz"; None for all.
+        columns: velocities by 0-based index or name; None for those that move the frame.
+        expressed_in: frame whose axes V and w are expressed in.
+        coordinates: velocities of a closed system, "independent" or "tree".
 
     Raises:
         ModelError: a row or column does not exist or is repeated, or the numbers of rows and
@@ -121,8 +140,8 @@ def selection(
         moving = [system.tree.links[k].v for k in system.tree.path(link)]
         columns = [k for part in moving for k in range(part.start, part.stop)]
         columns = list(range(len(names))) if reduced else columns
-    kept = _numbers(system, "row", range(6) if rows is None else rows, _ROWS)
-    chosen = _numbers(system, "column", columns, names)
+    kept = _given_indices(system, "row", range(6) if rows is None else rows, _ROWS)
+    chosen = _given_indices(system, "column", columns, names)
     if len(kept) != len(chosen):
         raise ModelError(
             f"{system.name}: the selection of the Jacobian of {quoted(frame)} has {len(kept)} rows"
@@ -136,13 +155,13 @@ def selection(
     )
 
 
-def _numbers(
+def _given_indices(
     system: System, what: str, given: Iterable[Any], names: Sequence[str]
 ) -> tuple[int, ...]:
-    """Return the indices of rows or columns (`what`) given by name or index.
+    """Return the indices of rows or columns given by name or index.
 
-    Raises:
-        ModelError: a name or index does not exist.
+    `what` is "row" or "column", and `names` are the valid names. Raise ModelError if an element
+    does not exist or is repeated.
     """
     numbers: list[int] = []
     if isinstance(given, str) or not isinstance(given, Iterable):
@@ -166,7 +185,7 @@ def _numbers(
 
 
 def _is_number(value: object, size: int) -> bool:
-    """Whether a value is an integer index from 0 to size - 1."""
+    """Return whether a value is an integer index from 0 to size - 1."""
     return hasattr(value, "__index__") and not isinstance(value, bool) and value in range(size)
 
 
@@ -179,7 +198,7 @@ def inverse_jacobian(
     expressed_in: str | int = "base",
     coordinates: str = "independent",
 ) -> Function:
-    """Inverse of a square submatrix of the Jacobian: ``inverse_jacobian(q) -> J_inv``.
+    """Return the inverse of a square submatrix of the Jacobian: ``inverse_jacobian(q) -> J_inv``.
 
     J_inv maps the selected rows of a frame velocity to the selected joint velocities. The axes and
     the reference point, such as the centre of a wrist, are chosen so that small blocks remain.
@@ -199,8 +218,8 @@ def inverse_jacobian(
         Function of q (nq, 1); J_inv (m, m) with one row per selected velocity.
 
     Raises:
-        ModelError: the frame, a row or a column is unknown, the numbers of rows and columns
-            differ, or the matrix is singular in every configuration.
+        ModelError: the frame, a row or a column is unknown, the numbers of rows and columns differ,
+            or the matrix is singular in every configuration.
     """
     chosen = selection(system, frame, rows, columns, expressed_in, coordinates)
 
@@ -220,7 +239,7 @@ def inverse_differential_kinematics(
     expressed_in: str | int = "base",
     coordinates: str = "independent",
 ) -> Function:
-    """Joint velocities of a frame velocity: ``ikm(q, twist) -> v_of_columns``.
+    """Return the joint velocities of a frame velocity: ``ikm(q, twist) -> v_of_columns``.
 
     Solves with the matrix that `inverse_jacobian` inverts, without forming the inverse.
 
@@ -262,7 +281,7 @@ def jacobian_determinant(
     expressed_in: str | int = "base",
     coordinates: str = "independent",
 ) -> Function:
-    """Determinant of a square submatrix of the Jacobian: ``determinant(q) -> det``.
+    """Return the determinant of a square submatrix of the Jacobian: ``determinant(q) -> det``.
 
     It is zero in singular configurations. It is the product of the determinants of the blocks of
     `inverse_jacobian`; `singularities` returns the single factors.

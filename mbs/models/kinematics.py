@@ -36,7 +36,7 @@ def jacobian(
     intermediate: int | None = None,
     reference: int | None = None,
 ) -> Function:
-    """Geometric Jacobian of a frame: ``jacobian(q) -> J`` with [V; w] = J v.
+    """Return the geometric Jacobian of a frame: ``jacobian(q) -> J`` with [V; w] = J v.
 
     V is the velocity of the frame origin, w the angular velocity. form="renaud" returns
     ``jacobian_renaud(q) -> R6, L, J`` with the full Jacobian R6 L J. Its factor J is about a
@@ -68,7 +68,7 @@ def jacobian(
     target, axes = system.frame(frame), system.frame(expressed_in)
     if form not in ("full", "renaud"):
         raise ModelError(f"{system.name}: form is {quoted(form)}; use 'full' or 'renaud'")
-    between = [_on_the_way(system, target[0], frame, k) for k in (intermediate, reference)]
+    between = [_tree_link(system, target[0], frame, k) for k in (intermediate, reference)]
 
     def full() -> tuple[Named, Named]:
         q = SX.sym("q", system.nq)
@@ -98,7 +98,14 @@ def jacobian(
 
 
 def in_coordinates(system: System, q: SX, J: SX, coordinates: str) -> SX:
-    """Convert a Jacobian of tree velocities to input velocities: J G in independent coordinates."""
+    """Return a Jacobian of tree velocities for the input velocities: J G if independent.
+
+    Args:
+        system: open or closed mechanism.
+        q: (nq, 1) symbols of positions.
+        J: (k, nv) Jacobian.
+        coordinates: "independent" or "tree".
+    """
     if is_reduced(system, coordinates):
         columns = set(casadi.sparsify(J).sparsity().get_triplet()[1])
         require_no_drift(system, "a Jacobian", sorted(columns))
@@ -106,11 +113,11 @@ def in_coordinates(system: System, q: SX, J: SX, coordinates: str) -> SX:
     return J
 
 
-def _on_the_way(system: System, link: int, frame: str | int, number: int | None) -> int | None:
-    """Convert a link index of the user (0 is the base) to a tree index (-1 is the base).
+def _tree_link(system: System, link: int, frame: str | int, number: int | None) -> int | None:
+    """Return a link index of the user (0 is the base) as a tree index (-1 is the base).
 
-    Raises:
-        ModelError: the link is not between the base and `link`, the link of the frame.
+    Raise ModelError if the link is not between the base and `link`, the link of the frame. None
+    stays.
     """
     if number is None:
         return None
@@ -130,7 +137,7 @@ def _on_the_way(system: System, link: int, frame: str | int, number: int | None)
 def link_velocities(
     system: System, coordinates: str = "independent", *, moving_base: bool = False
 ) -> Function:
-    """Velocities of all links, each in its own frame: ``link_velocities(q, v) -> V``.
+    """Return the velocities of all links, each in its own frame: ``link_velocities(q, v) -> V``.
 
     Source: Khalil & Creusot 1997, eq. 6.
 
@@ -167,9 +174,9 @@ def link_velocities(
 def link_accelerations(
     system: System, coordinates: str = "independent", *, moving_base: bool = False
 ) -> Function:
-    """Accelerations of all links, each in its own frame: ``link_accelerations(q, v, a) -> Vd``.
+    """Return the accelerations of all links: ``link_accelerations(q, v, a) -> Vd``.
 
-    They are accelerations relative to an inertial frame, expressed in link axes, without gravity.
+    They are relative to an inertial frame, each in the axes of its link, without gravity.
 
     Source: Khalil & Creusot 1997, eq. 8-10.
 
@@ -188,7 +195,7 @@ def link_accelerations(
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)
         name, a = s.input("a")
-        base, extra = _base(moving_base)
+        base, extra = _base_motion(moving_base)
         motions = tree_accelerations(system.tree, s.poses, s.v_tree, s.tree_acceleration(a), base)
         columns = [casadi.vertcat(link.vd, link.wd) for link in motions]
         return [*_state(s), (name, a), *extra], [("Vd", casadi.horzcat(*columns))]
@@ -209,7 +216,7 @@ def jacobian_dot_velocity(
     coordinates: str = "independent",
     moving_base: bool = False,
 ) -> Function:
-    """Acceleration of a frame for zero a, the term dJ/dt v: ``jpqp(q, v) -> jpqp``.
+    """Return the acceleration of a frame for zero a, the term dJ/dt v: ``jpqp(q, v) -> jpqp``.
 
     The time derivative is taken in the inertial frame; the result is then expressed in the axes of
     `expressed_in`. For a closed system with independent coordinates it is d(J G)/dt v_a, including
@@ -238,7 +245,7 @@ def jacobian_dot_velocity(
 
     def build() -> tuple[Named, Named]:
         s = symbols_of(system, coordinates)
-        base, extra = _base(moving_base)
+        base, extra = _base_motion(moving_base)
         a = s.tree_acceleration(SX.zeros(s.size))
         links = tree_accelerations(system.tree, s.poses, s.v_tree, a, base)
         motion = links[j] if j >= 0 else base
@@ -256,8 +263,8 @@ def _state(s: ModelSymbols) -> Named:
     return [("q", s.q), ("v" + s.suffix, s.v)]
 
 
-def _base(moves: bool) -> tuple[Acceleration, Named]:
-    """Motion of the base without gravity, and the inputs v_0, a_0 if it moves."""
+def _base_motion(moves: bool) -> tuple[Acceleration, Named]:
+    """Return the motion of the base without gravity, and its inputs v_0 and a_0 if it moves."""
     if not moves:
         return resting_base(zeros()), []
     v_0, a_0 = SX.sym("v_0", 6), SX.sym("a_0", 6)

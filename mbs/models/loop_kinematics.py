@@ -32,7 +32,9 @@ from mbs.spatial import Pose, zeros
 
 
 def velocity_closure(system: System) -> Function:
-    """Velocity constraints of the loops: ``velocity_closure(q) -> Wa, Wp, Wac, Wpc, Wc, W, G``.
+    """Return the velocity constraints of the loops.
+
+    They are ``velocity_closure(q) -> Wa, Wp, Wac, Wpc, Wc, W, G``.
 
     Wa v_a + Wp v_p = 0 are the independent closure rows (`system.closure.rows`), including
     couplings. Wac v_a + Wpc v_p + Wc v_c = 0, with Wc = -I, are the velocities v_c of the cut
@@ -45,9 +47,9 @@ def velocity_closure(system: System) -> Function:
         system: closed mechanism with m independent, r passive and c cut velocities.
 
     Returns:
-        Function of q (nq, 1), which must close the loops; Wa (r, m), Wp (r, r), Wac (c, m), Wpc
-        (c, r), Wc (c, c), W (r, m) with v_p = W v_a, and G (nv, m) with v = G v_a. Columns are in
-        the order of `system.closure.active` and `.passive` [rad or m in each].
+        Function of q (nq, 1), which must close the loops; Wa (r, m), Wp (r, r), Wac (c, m), Wpc (c,
+        r), Wc (c, c), W (r, m) with v_p = W v_a, and G (nv, m) with v = G v_a. Columns are in the
+        order of `system.closure.active` and `.passive` [rad or m in each].
 
     Raises:
         ModelError: the system is an open chain.
@@ -74,11 +76,11 @@ def velocity_closure(system: System) -> Function:
 
 
 def acceleration_closure(system: System, coordinates: str = "independent") -> Function:
-    """Velocity-dependent terms of the acceleration constraints of the loops.
+    """Return the velocity-dependent terms of the acceleration constraints of the loops.
 
-    ``acceleration_closure(q, v_a) -> Psi, Phi, G_dot``: Wa a_a + Wp a_p + Psi = 0 and
-    Wac a_a + Wpc a_p + Wc a_c + Phi = 0 with the matrices of `velocity_closure`. G_dot is the time
-    derivative of G along the motion.
+    ``acceleration_closure(q, v_a) -> Psi, Phi, G_dot``: Wa a_a + Wp a_p + Psi = 0 and Wac a_a + Wpc
+    a_p + Wc a_c + Phi = 0 with the matrices of `velocity_closure`. G_dot is the time derivative of
+    G along the motion.
 
     Source: Khalil & Creusot 1997, eq. 14.
 
@@ -144,7 +146,10 @@ def _require_loops(system: System) -> None:
 
 
 def _loop_rows(system: System, q: SX) -> _LoopRows:
-    """Return the independent constraint rows, and the velocity rows of the cut joints."""
+    """Return the independent constraint rows, and the velocity rows of the cut joints, at q.
+
+    Raise ModelError for an open chain.
+    """
     _require_loops(system)
     closure = system.closure
     assert closure is not None
@@ -155,7 +160,13 @@ def _loop_rows(system: System, q: SX) -> _LoopRows:
 
 
 def cut_velocities(system: System, q: SX, cut: Cut) -> SX:
-    """(c, nv) Jacobian of the freedoms of a cut joint with respect to the tree velocities."""
+    """Return the Jacobian (c, nv) of the coordinates of a cut joint by the tree velocities.
+
+    Args:
+        system: closed mechanism.
+        q: (nq, 1) symbols of positions.
+        cut: cut joint.
+    """
     pose = relative_pose(system.tree, q, *cut.frames)
     v = SX.sym("v", system.nv)
     values = _freedom_velocities(cut, pose, *cut_twist(system, pose, q, v))
@@ -163,7 +174,7 @@ def cut_velocities(system: System, q: SX, cut: Cut) -> SX:
 
 
 def _freedom_velocities(cut: Cut, pose: Pose, V: SX, w: SX) -> list[SX]:
-    """Velocities of the freedoms of a cut joint.
+    """Return the velocities of the coordinates of a cut joint.
 
     Args:
         cut: cut joint.
@@ -195,7 +206,7 @@ def _rate(system: System, matrix: SX, q: SX, v: SX) -> SX:
 
 
 def cut_coordinate(system: System, s: ModelSymbols, a: SX, name: str) -> tuple[SX, SX, SX]:
-    """Position, velocity and acceleration of a coordinate of a cut joint.
+    """Return position, velocity and acceleration of a coordinate of a cut joint.
 
     Angles are between -pi and pi.
 

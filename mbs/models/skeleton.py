@@ -35,7 +35,7 @@ _WIDE = 1e-6
 
 
 def link_outline(points: Array, held: int) -> list[tuple[int, int]]:
-    """Lines that represent a rigid link, as pairs of point indices.
+    """Return the lines that represent a rigid link, as pairs of point indices.
 
     Collinear joints are connected by a line from end to end, three or more other joints by a closed
     polygon. Each further point is connected to the nearest joint, unless it is inside the polygon.
@@ -64,14 +64,14 @@ def link_outline(points: Array, held: int) -> list[tuple[int, int]]:
 
 
 def _is_new(points: Array, k: int, apart: float) -> bool:
-    """Whether point k is farther than `apart` from each previous point."""
+    """Return whether point k is farther than `apart` [m] from each previous point."""
     return bool(np.all(np.linalg.norm(points[:k] - points[k], axis=1) > apart))
 
 
 def _polygon(points: Array, corners: list[int]) -> list[tuple[int, int]]:
-    """Return edges of a polygon through points `corners`; a line if they are in one row.
+    """Return the edges of a polygon through the points with indices `corners`.
 
-    Edges are pairs of indices of the points (n, 3).
+    It is a line if they are collinear. Edges are pairs of indices of the points (n, 3).
     """
     away = points[corners] - points[corners].mean(axis=0)
     _, sizes, axes = np.linalg.svd(away)
@@ -238,11 +238,14 @@ class _Marks:
         return len(self.directions) - 1
 
     def local(self, numbers: Sequence[int]) -> NDArray[np.float64]:
-        """(k, 3) coordinates of points, by column, in the frames of their links."""
+        """Return the coordinates (k, 3) of points, by column, in the frames of their links [m]."""
         return self.places([self.points[k][1] for k in numbers])
 
     def places(self, poses: Sequence[Pose]) -> NDArray[np.float64]:
-        """(k, 3) numeric origins of poses; parameters have their defaults, or 1 without default."""
+        """Return the numeric origins (k, 3) of poses [m].
+
+        Parameters have their defaults, or 1 without default.
+        """
         p = [1.0 if np.isnan(value) else value for value in self.system.parameter_values(needed=())]
         origins = casadi.horzcat(*(pose.p for pose in poses))
         return np.array(Function("places", [self.system.p], [origins])(p)).T
@@ -270,7 +273,11 @@ def _built(system: System) -> Skeleton:
 
 
 def _joint(marks: _Marks, row: JointRow) -> SkeletonJoint:
-    """Return name, end points and axes of a joint for drawing."""
+    """Return name, end points and axes of a joint for drawing.
+
+    `row` is the row of the joint in `system.joints`. Its points and directions are added to
+    `marks`.
+    """
     (a, pose_a), (b, pose_b) = row.frame_a, row.frame_b
     return SkeletonJoint(
         name=row.name,
@@ -283,7 +290,10 @@ def _joint(marks: _Marks, row: JointRow) -> SkeletonJoint:
 
 
 def _tree_axes(marks: _Marks, name: str) -> tuple[SkeletonAxis, ...]:
-    """Return the z axes of the links whose revolute or prismatic motion belongs to the joint."""
+    """Return the axes of the tree joint `name`: z axes of links with revolute or prismatic motion.
+
+    The directions are added to `marks`.
+    """
     system = marks.system
     moved = (
         (j, link.motion)
@@ -294,7 +304,10 @@ def _tree_axes(marks: _Marks, name: str) -> tuple[SkeletonAxis, ...]:
 
 
 def _cut_axes(marks: _Marks, row: JointRow) -> tuple[SkeletonAxis, ...]:
-    """Axes of a cut joint: the first axis is fixed in frame_a, further axes in frame_b."""
+    """Return the axes of a cut joint: the first is fixed in frame_a, further ones in frame_b.
+
+    `row` is the row of the joint in `system.joints`. The directions are added to `marks`.
+    """
     cut = next(cut for cut in marks.system.cuts if cut.edge.joint.name == row.name)
     frames = (row.frame_a, row.frame_b)
     found = []
@@ -307,20 +320,24 @@ def _cut_axes(marks: _Marks, row: JointRow) -> tuple[SkeletonAxis, ...]:
 
 
 def _axis(marks: _Marks, link: int, motion: Motion, axis: SX) -> SkeletonAxis:
-    """Return the drawn axis of a freedom; `axis` (3, 1) is its direction in the link frame."""
+    """Return the drawn axis of a freedom with the type `motion`, revolute or prismatic.
+
+    `axis` (3, 1) is its direction in the frame of the link with index `link`; it is added to
+    `marks`.
+    """
     kind: Literal["revolute", "prismatic"]
     kind = "revolute" if motion is Motion.REVOLUTE else "prismatic"
     return SkeletonAxis(kind, marks.direction(link, axis))
 
 
 def _shown_frames(system: System) -> list[str | int]:
-    """Return the names of the frames that are drawn."""
+    """Return the names of the frames that are drawn: named frames and the terminal frame."""
     outer = [OUTER_WORLD] if OUTER_WORLD in system.frames else []
     return list(dict.fromkeys([*outer, *system.named_frames, terminal_frame(system)]))
 
 
 def _frame(marks: _Marks, name: str | int) -> SkeletonFrame:
-    """Return origin and axes of a named frame for drawing."""
+    """Return origin and axes of the frame `name` for drawing; they are added to `marks`."""
     link, pose = marks.system.frame(name)
     x, y, z = (marks.direction(link, pose.R[:, k]) for k in range(3))
     label = f"link {name}" if isinstance(name, int) else name
@@ -328,7 +345,10 @@ def _frame(marks: _Marks, name: str | int) -> SkeletonFrame:
 
 
 def _link(marks: _Marks, number: int, joints: Sequence[SkeletonJoint]) -> SkeletonLink:
-    """Return joints, bodies and line segments of a link for drawing."""
+    """Return bodies and line segments of the link with index `number` (0: base) for drawing.
+
+    `joints` are all joints of the skeleton. Further points of the link are added to `marks`.
+    """
     bodies = tuple(row.name for row in marks.system.bodies if row.link == number)
     if number == 0:
         return SkeletonLink(0, bodies, (), None)
@@ -356,7 +376,11 @@ def _link(marks: _Marks, number: int, joints: Sequence[SkeletonJoint]) -> Skelet
 def _segments(
     marks: _Marks, joined: Sequence[int], shown: Sequence[int]
 ) -> tuple[tuple[int, int], ...]:
-    """Return line segments (pairs of points) between joints of a link and its shown points."""
+    """Return line segments between joints and other points of a link, as pairs of columns.
+
+    `joined` and `shown` are the columns of the joints and of the other points in the points of
+    `marks`.
+    """
     columns = [*joined, *shown]
     if not columns:
         return ()
@@ -365,7 +389,7 @@ def _segments(
 
 
 def _farthest_frame(marks: _Marks, number: int, joint: int, centre: int | None) -> int | None:
-    """Column of the frame of a link, such as a foot, that is farthest from its joint.
+    """Return the column of the frame of a link, such as a foot, that is farthest from its joint.
 
     None if the link has no frame, or if all its frames coincide with the joint.
 
@@ -390,7 +414,10 @@ def _farthest_frame(marks: _Marks, number: int, joint: int, centre: int | None) 
 
 
 def _mass_centre(marks: _Marks, number: int) -> int | None:
-    """Return the index of the centre of mass among the points; None for zero or unknown mass."""
+    """Return the column of the centre of mass of link `number`, added to the points of `marks`.
+
+    None for a link of zero or unknown mass.
+    """
     inertia, system = marks.system.tree.links[number - 1].inertia, marks.system
     known = casadi.vertcat(inertia.m, inertia.ms)
     at = Function("centre", [system.p], [known])(system.parameter_values(needed=()))
@@ -400,7 +427,7 @@ def _mass_centre(marks: _Marks, number: int) -> int | None:
 
 
 def _function(system: System, marks: _Marks) -> Function:
-    """Return the function of q that computes all points and directions of the skeleton."""
+    """Return the function of q that computes all points and directions collected in `marks`."""
 
     def build() -> tuple[Named, Named]:
         q = SX.sym("q", system.nq)

@@ -55,47 +55,70 @@ class ModelSymbols:
         return int(self.v.numel())
 
     def tree_acceleration(self, a: SX) -> SX:
-        """(nv, 1) accelerations of the tree for accelerations a (m, 1): G a + gamma."""
+        """Return the accelerations (nv, 1) of the tree for accelerations a (m, 1): G a + gamma."""
         if self.reduction is None:
             return a
         assert self.reduction.gamma is not None
         return casadi.mtimes(self.reduction.G, a) + self.reduction.gamma
 
     def reduced_effort(self, tau: SX) -> SX:
-        """Project joint efforts of the tree on the input coordinates: G' tau."""
+        """Return joint efforts tau (nv, 1) of the tree in input coordinates: G' tau, (m, 1)."""
         return tau if self.reduction is None else casadi.mtimes(self.reduction.G.T, tau)
 
     def reduced_matrix(self, A: SX) -> SX:
-        """Project a matrix A (nv, nv) of the tree on the input coordinates: G' A G."""
+        """Return a matrix A (nv, nv) of the tree in input coordinates: G' A G, (m, m)."""
         if self.reduction is None:
             return A
         G = self.reduction.G
         return casadi.mtimes(G.T, casadi.mtimes(A, G))
 
     def input(self, name: str) -> tuple[str, SX]:
-        """Return a named input (m, 1) in the coordinates of v, such as ("a_a", symbol)."""
+        """Return name and new symbol (m, 1) of an input in the coordinates of v.
+
+        Args:
+            name: name without suffix: "a" gives ("a_a", symbol) in independent coordinates.
+        """
         label = name + self.suffix
         return label, SX.sym(label, self.size)
 
 
 def configuration_check(system: System, coordinates: str) -> ConfigurationCheck | None:
-    """Return the check of configurations for a model in these coordinates, None if not needed.
+    """Return the check of configurations for a model in some coordinates; None if not needed.
 
     A model in independent coordinates requires closed loops and dependent joints that are
     determined by the independent joints.
+
+    Args:
+        system: open or closed mechanism.
+        coordinates: "independent" or "tree".
+
+    Raises:
+        ModelError: `system` is not a System.
     """
     require_system(system)
     return DETERMINED if is_reduced(system, coordinates) else None
 
 
 def derivatives_check(system: System, coordinates: str) -> ConfigurationCheck | None:
-    """Return the stricter check for models that contain second derivatives of the loops."""
+    """Return the check of configurations for models that contain second derivatives of loops.
+
+    It is stricter than `configuration_check`; None if not needed.
+
+    Args:
+        system: open or closed mechanism.
+        coordinates: "independent" or "tree".
+    """
     require_system(system)
     return DIFFERENTIABLE if is_reduced(system, coordinates) else None
 
 
 def check_coordinates(system: System, coordinates: str) -> None:
-    """Raise ModelError if `coordinates` is not "independent" or "tree"."""
+    """Raise ModelError if `coordinates` is not "independent" or "tree".
+
+    Args:
+        system: mechanism, for the message.
+        coordinates: argument of a user.
+    """
     if coordinates not in COORDINATES:
         raise ModelError(
             f"{system.name}: coordinates is {coordinates!r}; use 'independent' or 'tree'"
@@ -103,12 +126,17 @@ def check_coordinates(system: System, coordinates: str) -> None:
 
 
 def is_reduced(system: System, coordinates: str) -> bool:
-    """Whether a model is in the independent coordinates of a closed system."""
+    """Return whether a model is in the independent coordinates of a closed system.
+
+    Args:
+        system: open or closed mechanism.
+        coordinates: "independent" or "tree".
+    """
     return system.is_closed and coordinates == "independent"
 
 
 def symbols_of(system: System, coordinates: str = "independent") -> ModelSymbols:
-    """Return new symbols q and v of a system with the quantities of `ModelSymbols`.
+    """Return new symbols q and v of a system, with velocities and poses of the tree.
 
     Args:
         system: open or closed mechanism.
@@ -132,10 +160,14 @@ def symbols_of(system: System, coordinates: str = "independent") -> ModelSymbols
 
 
 def solution_order(system: System, s: ModelSymbols) -> list[int]:
-    """Parent index of each input velocity for the sparse factorisation of A; see `factorize`.
+    """Return the parent of each input velocity for the sparse factorisation of A.
 
-    -1 for a velocity without a parent. In independent coordinates A is dense, so that the parent
-    is the preceding index.
+    It is -1 for a velocity without a parent. In independent coordinates A is dense, so that the
+    parent is the preceding index. See `factorize`.
+
+    Args:
+        system: open or closed mechanism.
+        s: symbols of the model.
     """
     if s.reduction is None:
         return velocity_antecedents(system.tree)
@@ -162,14 +194,16 @@ class ExternalForces:
 
 
 def surroundings(system: System, f_ext: bool = False, moves: bool = False) -> ExternalForces:
-    """Return gravity on a resting base without external wrenches, or model inputs for both.
+    """Return gravity and base motion of a mechanism, and external wrenches, as model inputs.
+
+    By default the base rests and there are no external wrenches.
 
     Args:
         system: mechanism; its gravity vector is expressed in the base frame at R_0 = 1.
         f_ext: whether to add the input f_ext (6, bodies): for each row of `system.bodies` the
             wrench [force; moment] that the body exerts on its environment, in the body frame.
-        moves: whether to add the inputs v_0 and a_0 (6, 1), velocity [V; w] and acceleration
-            [vd; wd] of the base origin in base axes, and R_0 (3, 3), orientation of the base in the
+        moves: whether to add the inputs v_0 and a_0 (6, 1), velocity [V; w] and acceleration [vd;
+            wd] of the base origin in base axes, and R_0 (3, 3), orientation of the base in the
             fixed frame that gravity is expressed in.
     """
     gravity, inputs = system.tree.gravity, list[tuple[str, SX]]()
@@ -189,7 +223,9 @@ def surroundings(system: System, f_ext: bool = False, moves: bool = False) -> Ex
 def exerted(
     system: System, around: ExternalForces, poses: list[LinkPose], q: SX, v: SX
 ) -> dict[int, Wrench]:
-    """Wrenches that links exert on their environment and on force elements, by link index.
+    """Return the wrenches that links exert on environment and force elements, by link index.
+
+    They are about the origin and in axes of the link frame.
 
     Args:
         system: mechanism with force elements.
@@ -202,7 +238,15 @@ def exerted(
 
 
 def wrenches_on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
-    """Transform wrenches (6, bodies) from body frames to link frames; sums by link index."""
+    """Return wrenches on bodies as wrenches on links, by link index.
+
+    Args:
+        system: open or closed mechanism.
+        wrenches: (6, bodies) wrench of each row of `system.bodies`, in the body frame.
+
+    Returns:
+        sums about the origin and in axes of the link frames.
+    """
     exerted: list[dict[int, Wrench]] = []
     for column, row in enumerate(system.bodies):
         link, pose = system.frames[row.name]
@@ -216,7 +260,7 @@ def wrenches_on_links(system: System, wrenches: SX) -> dict[int, Wrench]:
 
 
 def outputs_of(system: System, model: Function, *values: SX) -> list[SX]:
-    """Call a model on SX values and return its outputs.
+    """Return the outputs of a model for SX values of its inputs.
 
     Args:
         system: mechanism; its symbols z, u and p are passed as the remaining inputs.
@@ -229,7 +273,13 @@ def outputs_of(system: System, model: Function, *values: SX) -> list[SX]:
 
 
 def dense_function(name: str, inputs: list[SX], outputs: list[SX]) -> Function:
-    """Return a Function with dense outputs and common subexpression elimination."""
+    """Return a Function with dense outputs and common subexpression elimination.
+
+    Args:
+        name: name of the Function.
+        inputs: symbols.
+        outputs: expressions.
+    """
     return Function(name, inputs, [casadi.densify(o) for o in outputs], {"cse": True})
 
 
@@ -237,7 +287,7 @@ def dense_function(name: str, inputs: list[SX], outputs: list[SX]) -> Function:
 
 
 def devices(system: System) -> Function:
-    """Equations of devices and other components: ``devices(v, z, u) -> tau, zdot, y``.
+    """Return the equations of devices and other components: ``devices(v, z, u) -> tau, zdot, y``.
 
     z are component states such as currents, u component inputs such as voltages and torques, y
     further component outputs of a simulation. `devices(system).elements("z")` names the elements.
@@ -249,8 +299,8 @@ def devices(system: System) -> Function:
         Function of tree velocities v (nv, 1), states z (nz, 1) and inputs u (nu, 1). The first
         input is q (nq, 1) if an output depends on positions. The last input is row_efforts (r, 1),
         efforts of the constraint rows of components in their order, if an output depends on them.
-        Outputs: efforts tau (nv, 1) of devices on the joint coordinates [N m or N], zdot (nz, 1),
-        y (ny, 1).
+        Outputs: efforts tau (nv, 1) of devices on the joint coordinates [N m or N], zdot (nz, 1), y
+        (ny, 1).
 
     Raises:
         ModelError: the system has no device, state or output.
@@ -285,12 +335,18 @@ def devices(system: System) -> Function:
 
 
 def state_count(system: System) -> int:
-    """Number of states of all components."""
+    """Return the number of states of all components.
+
+    Args:
+        system: open or closed mechanism.
+    """
     return int(system.z.numel())
 
 
 def part_equations(system: System, q: SX, v: SX) -> tuple[SX, SX, PartsAt]:
-    """Efforts of devices (nv, 1), rates of component states, and the evaluated components.
+    """Return efforts of devices (nv, 1), rates of component states, and the components.
+
+    The last are the `PartsAt` at q and v.
 
     The expressions also depend on the symbols `system.z`, `system.u` and `system.p`.
 

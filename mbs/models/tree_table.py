@@ -26,7 +26,7 @@ from mbs.spatial import elements
 
 
 def unknown_to_core(system: System) -> str:
-    """Reason, as error text, why `tree_core` does not support a system; empty if it does."""
+    """Return the reason why `tree_core` does not support a system, as error text; else empty."""
     if system.is_closed:
         return (
             "tree_core is for open trees and this system has loops or couplings;"
@@ -111,14 +111,14 @@ class TreeLoops:
             return None
         table = table_of(system)
         shapes = shapes_of(system, table)
-        if _shape(shapes[name]) != _shape(function):
+        if _port_sizes(shapes[name]) != _port_sizes(function):
             return None
         names = [name] * value + [f"jac_{name}"] * jacobian
         files = tree_files(table, {x: shapes[x] for x in names})
         return LoopCode(files, COMMON, value, jacobian, jacobian and table.dependent is not None)
 
 
-def _shape(function: Function) -> list[object]:
+def _port_sizes(function: Function) -> list[object]:
     """Return the names and sizes of the inputs and outputs of a Function."""
     return [
         *((function.name_in(k), function.size_in(k)) for k in range(function.n_in())),
@@ -136,7 +136,12 @@ def _longest_branch(system: System) -> int:
 
 
 def shapes_of(system: System, table: TreeTable) -> dict[str, Function]:
-    """Placeholder Functions with the signatures of the tree core, by name."""
+    """Return placeholder Functions with the signatures of the tree core, by name.
+
+    Args:
+        system: open mechanism.
+        table: table of its tree.
+    """
     return tree_functions(table, len(system.parameters), default_in(system, 1)[1:])
 
 
@@ -159,10 +164,14 @@ def _depth_first(links: Sequence[Link]) -> list[int]:
 
 
 def table_of(system: System) -> TreeTable:
-    """Return the table of a tree: indices of its nodes, numeric data, parameter-dependent data."""
+    """Return the table of an open tree: index lists, numbers, parameter-dependent numbers.
+
+    Args:
+        system: open mechanism.
+    """
     links = system.tree.links
     order = _depth_first(links)
-    lists = _lists(links, order)
+    lists = _index_lists(links, order)
     numbers = [0.0] * place_of(0, -(-system.nv // 8) * 8) + [0.0] * 3
     dependent: dict[int, SX] = {}
 
@@ -194,7 +203,10 @@ _UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
 def _put_link(put: Callable[[int, int, SX], None], link: Link, j: int, first: int) -> None:
-    """Write the data of link j, whose first node is `first`, by `put(row, node, value)`."""
+    """Write the data of link j to a table by calls `put(row, node, value)`.
+
+    `first` is its first node; each velocity is a node.
+    """
     last, rotor = first + link.motion.nv - 1, link.rotor
     pose, body = link.pose(), link.inertia
     tensor = casadi.vertcat(*(body.J[r, c] for r, c in _UPPER))
@@ -227,8 +239,11 @@ _KIND = {Motion.REVOLUTE: 0, Motion.PRISMATIC: 1, Motion.SPHERICAL: 2, Motion.FR
 first velocities but have the last codes."""
 
 
-def _lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:
-    """Index lists of the nodes of a tree, by name, as declared in tree_core.h."""
+def _index_lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:
+    """Return the index lists of the nodes of a tree by name, as declared in tree_core.h.
+
+    `order` has the link indices in depth-first order.
+    """
     names = ("before", "link", "end", "first", "last", "kind", "q_at", "v_at", "runs_from", "runs")
     result: dict[str, list[int]] = {name: [] for name in (*names, "joints", "rotor", "rub")}
     first, last = dict[int, int](), {-1: -1}
@@ -238,7 +253,7 @@ def _lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:
         link, count = links[j], links[j].motion.nv
         i = link.antecedent
         first[j], last[j] = size, size + count - 1
-        ancestry[j] = _extended(ancestry[i], size, size + count)
+        ancestry[j] = _with_run(ancestry[i], size, size + count)
         for h in range(count):
             result["before"].append(size - 1 if h else last[i])
             result["link"].append(last[i])
@@ -269,8 +284,11 @@ def _lists(links: Sequence[Link], order: Sequence[int]) -> dict[str, list[int]]:
     return result
 
 
-def _extended(runs: list[int], first: int, end: int) -> list[int]:
-    """Append the run of nodes [first, end) to a flat list of runs; adjacent runs are merged."""
+def _with_run(runs: list[int], first: int, end: int) -> list[int]:
+    """Return a flat list of runs with the run of nodes [first, end) appended.
+
+    Adjacent ones merge.
+    """
     if runs and runs[-1] == first:
         return [*runs[:-1], end]
     return [*runs, first, end]

@@ -95,12 +95,21 @@ def count(function: Function, parameters: Iterable[str] = ("p",)) -> Count:
 
 
 def cheapest(*models: Function) -> Function:
-    """Return the Function with the lowest `price` among equal Functions; the first if several."""
+    """Return the first Function with the lowest `Count.price` among equal Functions.
+
+    Args:
+        models: one or more Functions with equal values.
+    """
     return models[0] if len(models) == 1 else min(models, key=lambda model: count(model).price)
 
 
 def count_graph(graph: Graph, parameters: Iterable[str] = ("p",)) -> Count:
-    """Count the operations of a graph; see `count`."""
+    """Return the numbers of operations of a graph; nodes that no output needs are not counted.
+
+    Args:
+        graph: scalar operations of a Function.
+        parameters: names of inputs that are constant from call to call; see `count`.
+    """
     alive, fixed = graph.live(), graph.fixed_by(parameters)
     changing: Counter[str] = Counter()
     once: Counter[str] = Counter()
@@ -113,16 +122,24 @@ def count_graph(graph: Graph, parameters: Iterable[str] = ("p",)) -> Count:
 
 
 def _numbers(tally: Counter[str]) -> Count:
+    """Return the numbers of operations by kind as a Count, without `parameter_only`."""
     return Count(**{kind: tally[kind] for kind in _KINDS}, parameter_only=None)
 
 
 def _kind(graph: Graph, number: int) -> str:
-    """Return the attribute of Count for an operation; empty if the operation is free."""
+    """Return the field of Count ("mul", "add", ...) for the operation of node `number`.
+
+    Empty if the operation is free: inputs, constants, signs and assignments.
+    """
     op = graph.nodes[number].op
     return _kind_of_product(graph, number) if op in _MUL else _KIND.get(op, "other")
 
 
 def _kind_of_product(graph: Graph, number: int) -> str:
+    """Return the field of Count for the product node `number`.
+
+    "" for a factor of 1 or -1, "add" for 2 or -2, else "mul".
+    """
     operands = (graph.nodes[operand] for operand in graph.operands(number))
     factor = {abs(node.value) for node in operands if node.op == casadi.OP_CONST}
     if factor == {1.0}:

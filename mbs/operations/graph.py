@@ -30,7 +30,7 @@ class Node(NamedTuple):
 
 
 class Port(NamedTuple):
-    """Input or output: its name and its sparsity."""
+    """Input or output of a Function: its name and its sparsity pattern."""
 
     name: str
     sparsity: Sparsity
@@ -55,12 +55,15 @@ class Graph:
     results: tuple[tuple[int, ...], ...]
 
     def operands(self, number: int) -> tuple[int, ...]:
-        """Return the indices of the operands of a node; empty for an input or constant."""
+        """Return the indices of the operands of the node `number`.
+
+        Empty for an input or constant.
+        """
         node = self.nodes[number]
         return () if node.op in (casadi.OP_INPUT, casadi.OP_CONST) else node.args
 
     def live(self) -> list[bool]:
-        """Return whether an output needs the node, for each node."""
+        """Return for each node whether an output depends on it."""
         alive = [False] * len(self.nodes)
         for result in self.results:
             for number in result:
@@ -72,7 +75,10 @@ class Graph:
         return alive
 
     def uses(self) -> list[int]:
-        """Return the number of uses of each node by nodes and outputs; a square counts once."""
+        """Return for each node the number of its uses by nodes and outputs.
+
+        A square, which has one operand, is one use. A node that is both operands counts twice.
+        """
         uses = [0] * len(self.nodes)
         for number in range(len(self.nodes)):
             for operand in self.operands(number):
@@ -83,7 +89,7 @@ class Graph:
         return uses
 
     def fixed_by(self, names: Iterable[str]) -> list[bool]:
-        """Return whether only constants and the named inputs determine a node, for each node."""
+        """Return for each node whether it depends on constants and on the inputs `names` only."""
         known = {k for k, port in enumerate(self.inputs) if port.name in set(names)}
         fixed: list[bool] = []
         for number, node in enumerate(self.nodes):
@@ -94,12 +100,20 @@ class Graph:
         return fixed
 
     def with_nodes(self, nodes: Sequence[Node], results: Sequence[Sequence[int]]) -> Graph:
-        """Return the same Function with other nodes."""
+        """Return the graph with other nodes and other results, and the same inputs and outputs.
+
+        Args:
+            nodes: nodes in an executable order.
+            results: node indices of the non-zero elements of each output.
+        """
         return replace(self, nodes=tuple(nodes), results=tuple(tuple(r) for r in results))
 
 
 def graph_of(function: Function) -> Graph:
-    """Return the scalar operations of a Function; an MX Function is expanded first.
+    """Return the graph of the scalar operations of a Function; an MX Function is expanded first.
+
+    Args:
+        function: SX Function, or MX Function that can be expanded.
 
     Raises:
         ModelError: the argument is no Function, or it contains calls without scalar operations,
@@ -137,6 +151,9 @@ def graph_of(function: Function) -> Graph:
 def expanded(function: Function) -> Function:
     """Return a Function with its operations expanded to scalars (SX); an SX Function is unchanged.
 
+    Args:
+        function: SX Function, or MX Function that can be expanded.
+
     Raises:
         ModelError: it contains calls without scalar operations, such as an integrator.
     """
@@ -161,7 +178,7 @@ def function_of(graph: Graph, defaults: Sequence[float] = ()) -> Function:
 
     Args:
         graph: operations to compute.
-        defaults: default values of the inputs.
+        defaults: default value of each input; zeros if empty.
     """
     symbols = [SX.sym(port.name, port.sparsity) for port in graph.inputs]
     elements = [[SX(s.nz[k]) for k in range(s.nnz())] for s in symbols]
@@ -214,11 +231,15 @@ _EVEN = {casadi.OP_COS, casadi.OP_COSH, casadi.OP_FABS, casadi.OP_SQ}
 
 
 class Builder:
-    """Builder of the nodes of a graph.
+    """Builder of the nodes of a graph: equal nodes are merged and constants are evaluated.
 
-    Each method returns the index of the node with the requested value, an existing node if there
-    is one. A sign is a separate node. It is moved outwards through sums, products and odd
-    functions, so that x - y and y - x, or sin(x) and sin(-x), share their nodes.
+    Each method returns the index of the node with the requested value, an existing node if there is
+    one. A sign is a separate node. It is moved outwards through sums, products and odd functions,
+    so that x - y and y - x, or sin(x) and sin(-x), share their nodes.
+
+    Args:
+        graph: graph whose inputs the nodes refer to.
+        parameters: names of the inputs that are parameters.
 
     Attributes:
         nodes: nodes; the operands of a node precede it.
@@ -243,7 +264,13 @@ class Builder:
         }
 
     def node(self, op: int, args: tuple[int, ...], value: float = 0.0) -> int:
-        """Return the node with this operation, unsimplified; an existing node if there is one."""
+        """Return the index of the node of an operation, without simplification.
+
+        Args:
+            op: CasADi's code of the operation.
+            args: indices of the operands, as in `Node`.
+            value: value of a constant.
+        """
         if op in COMMUTATIVE and args[1] < args[0]:
             args = (args[1], args[0])
         node = Node(op, args, value)
@@ -255,46 +282,67 @@ class Builder:
         return number
 
     def add(self, node: Node, operands: Sequence[int]) -> int:
-        """Return the node for a node of another graph, with operands of this builder."""
+        """Return the index of a node that computes the same as a node of another graph.
+
+        Args:
+            node: node of the other graph.
+            operands: indices of its operands in this builder.
+        """
         if node.op in (casadi.OP_INPUT, casadi.OP_CONST):
             return self.node(node.op, node.args, node.value)
         return self.apply(node.op, *operands)
 
     def apply(self, op: int, *operands: int) -> int:
-        """Return the simplified result of an operation on nodes."""
+        """Return the index of the simplified result of an operation on nodes.
+
+        Args:
+            op: CasADi's code of the operation.
+            operands: indices of the one or two operands.
+        """
         rule = self._rules.get(op)
         if rule is not None:
             return rule(*operands)
         if all(self.nodes[a].op == casadi.OP_CONST for a in operands):
             return self._fold(op, operands)
-        if op in _ODD and self._is(operands[0], casadi.OP_NEG):
+        if op in _ODD and self._has_operation(operands[0], casadi.OP_NEG):
             return self.negative(self.apply(op, self.nodes[operands[0]].args[0]))
-        if op in _EVEN and self._is(operands[0], casadi.OP_NEG):
+        if op in _EVEN and self._has_operation(operands[0], casadi.OP_NEG):
             return self.apply(op, self.nodes[operands[0]].args[0])
         return self.node(op, operands)
 
     def cost_since(self, start: int) -> int:
-        """Return the number of nodes from `start` on that cost time at every call."""
+        """Return the number of nodes with index `start` or more that cost time at every call.
+
+        Inputs, constants, signs and nodes of parameters alone are not counted.
+        """
         numbers = range(start, len(self.nodes))
         return sum(1 for n in numbers if not self.fixed[n] and self.nodes[n].op not in _FREE)
 
     def forget_since(self, start: int) -> None:
-        """Remove all nodes from `start` on."""
+        """Remove all nodes with index `start` or more."""
         for node in self.nodes[start:]:
             del self._numbers[node]
         del self.nodes[start:], self.fixed[start:]
 
     def constant(self, value: float) -> int:
-        """Return the node of a constant."""
+        """Return the index of the node of a constant.
+
+        Args:
+            value: value of the constant.
+        """
         return self.node(casadi.OP_CONST, (), float(value))
 
     def value(self, number: int) -> float | None:
-        """Return the value of a constant node; None for another node."""
+        """Return the value of the node `number` if it is a constant; else None."""
         node = self.nodes[number]
         return node.value if node.op == casadi.OP_CONST else None
 
     def unsigned(self, number: int) -> tuple[int, int]:
-        """Return sign (1 or -1) and node of a value, where the node itself has no sign."""
+        """Return (sign, node) of the value of a node: sign is 1 or -1, and the node has no sign.
+
+        Args:
+            number: index of a node.
+        """
         node = self.nodes[number]
         if node.op == casadi.OP_NEG:
             return -1, node.args[0]
@@ -303,7 +351,7 @@ class Builder:
         return 1, number
 
     def negative(self, a: int) -> int:
-        """Return -a."""
+        """Return the index of the node -a, for a node index a."""
         node = self.nodes[a]
         if node.op == casadi.OP_NEG:
             return node.args[0]
@@ -312,7 +360,7 @@ class Builder:
         return self.node(casadi.OP_NEG, (a,))
 
     def sum(self, a: int, b: int) -> int:
-        """Return a + b."""
+        """Return the index of the node a + b, for node indices a and b."""
         folded = self._both_constant(casadi.OP_ADD, a, b)
         if folded is not None:
             return folded
@@ -330,11 +378,11 @@ class Builder:
         return result if sign_a > 0 else self.negative(result)
 
     def difference(self, a: int, b: int) -> int:
-        """Return a - b."""
+        """Return the index of the node a - b, for node indices a and b."""
         return self.sum(a, self.negative(b))
 
     def product(self, a: int, b: int) -> int:
-        """Return a b."""
+        """Return the index of the node a b, for node indices a and b."""
         folded = self._both_constant(casadi.OP_MUL, a, b)
         if folded is not None:
             return folded
@@ -345,7 +393,10 @@ class Builder:
         return result if sign_a == sign_b else self.negative(result)
 
     def quotient(self, a: int, b: int) -> int:
-        """Return a / b; a product if b is constant."""
+        """Return the index of the node a / b, for node indices a and b.
+
+        A product if b is constant.
+        """
         (sign_a, a), (sign_b, b) = self.unsigned(a), self.unsigned(b)
         divisor = self.value(b)
         if self.value(a) == 1.0:
@@ -357,7 +408,7 @@ class Builder:
         return result if sign_a == sign_b else self.negative(result)
 
     def _multiply(self, a: int, b: int) -> int:
-        """Return a b for operands without signs; if one is constant, it is a."""
+        """Return the index of a b for nodes without signs; if one of them is constant, it is a."""
         factor = self.value(a)
         if factor == 0.0:
             return a
@@ -379,14 +430,14 @@ class Builder:
         return self.node(casadi.OP_MUL, (a, b))
 
     def _plain_sum(self, a: int, b: int) -> int:
-        """Return a + b for operands without signs; x if they are x - b and b."""
+        """Return the index of a + b for nodes without signs; x if they are x - y and y."""
         for one, other in ((a, b), (b, a)):
-            if self._is(one, casadi.OP_SUB) and self.nodes[one].args[1] == other:
+            if self._has_operation(one, casadi.OP_SUB) and self.nodes[one].args[1] == other:
                 return self.nodes[one].args[0]
         return self.node(casadi.OP_ADD, (a, b))
 
     def _remainder(self, a: int, b: int) -> int | None:
-        """Return a - b if a is a sum or difference with b as its operand; else None."""
+        """Return the index of a - b if a is a sum or difference that contains b; else None."""
         node = self.nodes[a]
         if node.op == casadi.OP_ADD and b in node.args:
             return node.args[1] if node.args[0] == b else node.args[0]
@@ -395,7 +446,7 @@ class Builder:
         return None
 
     def _subtract(self, a: int, b: int) -> int:
-        """Return a - b for operands without signs; -(b - a) if b - a exists."""
+        """Return the index of a - b for nodes without signs; that of -(b - a) if b - a exists."""
         if a == b:
             return self.constant(0.0)
         if self.value(b) == 0.0:
@@ -412,6 +463,7 @@ class Builder:
         return self.node(casadi.OP_SUB, (a, b))
 
     def _if_else_zero(self, condition: int, value: int) -> int:
+        """Return the index of the node that is `value` if `condition` is not zero, else 0."""
         if self.value(value) == 0.0 or self.value(condition) == 0.0:
             return self.constant(0.0)
         if self.value(condition) is not None:
@@ -421,7 +473,10 @@ class Builder:
         return result if sign > 0 else self.negative(result)
 
     def _both_constant(self, op: int, a: int, b: int) -> int | None:
-        """Return the sum or product of two constants; None for other operands."""
+        """Return the index of the sum or product (`op`) of two constants.
+
+        None for other operands.
+        """
         one, other = self.nodes[a], self.nodes[b]
         if one.op != casadi.OP_CONST or other.op != casadi.OP_CONST:
             return None
@@ -429,24 +484,29 @@ class Builder:
         return self.constant(one.value * other.value if product else one.value + other.value)
 
     def _fold(self, op: int, operands: Sequence[int]) -> int:
-        """Evaluate an operation on constants; it remains a node if the result is not finite."""
+        """Evaluate the operation `op` on constants.
+
+        It remains a node if the result is not finite.
+        """
         numbers = [DM(self.nodes[a].value) for a in operands]
         result = DM.unary(op, *numbers) if len(numbers) == 1 else DM.binary(op, *numbers)
         if not math.isfinite(float(result)):
             return self.node(op, tuple(operands))
         return self.constant(float(result))
 
-    def _is(self, number: int, op: int) -> bool:
+    def _has_operation(self, number: int, op: int) -> bool:
+        """Return whether the node `number` has the operation `op`."""
         return self.nodes[number].op == op
 
     def _is_fixed(self, node: Node) -> bool:
+        """Return whether a node depends on constants and parameters only."""
         if node.op == casadi.OP_INPUT:
             return self._known[node.args[0]]
         return node.op == casadi.OP_CONST or all(self.fixed[a] for a in node.args)
 
 
 def rebuild(graph: Graph, builder: Builder) -> Graph:
-    """Add the live nodes of a graph to a builder."""
+    """Return the graph with its live nodes built again by a builder, which simplifies them."""
     numbers = [-1] * len(graph.nodes)
     for number, alive in enumerate(graph.live()):
         if alive:
@@ -460,7 +520,7 @@ def rebuild(graph: Graph, builder: Builder) -> Graph:
 
 
 def drop(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
-    """Return the graph without the nodes that no output needs."""
+    """Return the graph without the nodes that no output needs; `parameters` has no effect."""
     numbers = [-1] * len(graph.nodes)
     nodes: list[Node] = []
     for number, alive in enumerate(graph.live()):

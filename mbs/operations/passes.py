@@ -17,6 +17,7 @@ from mbs.operations.polynomials import (
     Monomial,
     Pair,
     Polynomial,
+    Writer,
     angle,
     extract_pairs,
     improved,
@@ -28,7 +29,7 @@ from mbs.operations.polynomials import (
 # Trigonometric functions of sums of angles instead of products of sines and cosines.
 
 
-class _Meeting(NamedTuple):
+class _AnglePair(NamedTuple):
     """Term with sines or cosines of two angles: factor `first` and factor `second`."""
 
     monomial: Monomial
@@ -38,23 +39,30 @@ class _Meeting(NamedTuple):
 
 
 def angles(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
-    """Join rotations about parallel axes: c2 c3 - s2 s3 becomes cos(q2 + q3).
+    """Replace products of sines and cosines of two angles: c2 c3 - s2 s3 becomes cos(q2 + q3).
 
     Consecutive rotations of vectors are joined too. Each pair of angles is tried separately. The
     result is kept if the graph is cheaper.
+
+    Args:
+        graph: graph to transform.
+        parameters: names of the inputs that are constant from call to call.
     """
     return improved(graph, parameters, _join_angles, lambda pair: pair[0] != pair[1])
 
 
 def _join_angles(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polynomial:
-    """Join two angles wherever both terms exist; return the same polynomial if they never do."""
+    """Replace products of sines and cosines of the two angles of `pair` by those of their sum.
+
+    Return `polynomial` itself if no terms match.
+    """
     opened = multiplied_out(algebra, polynomial, pair)
-    meetings: dict[Monomial, dict[tuple[int, int], _Meeting]] = {}
+    meetings: dict[Monomial, dict[tuple[int, int], _AnglePair]] = {}
     nodes = algebra.builder.nodes
     for monomial, coefficient in opened.items():
-        for first, second in _of_both(algebra, monomial, pair):
+        for first, second in _factor_pairs(algebra, monomial, pair):
             ops = nodes[first].op, nodes[second].op
-            meeting = _Meeting(monomial, coefficient, first, second)
+            meeting = _AnglePair(monomial, coefficient, first, second)
             meetings.setdefault(without(monomial, first, second), {})[ops] = meeting
     result = dict(opened)
     for rest, found in meetings.items():
@@ -66,7 +74,7 @@ def _join_angles(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polyno
     return polynomial if result == opened else result
 
 
-def _of_both(algebra: Algebra, monomial: Monomial, pair: Pair) -> Iterator[tuple[int, int]]:
+def _factor_pairs(algebra: Algebra, monomial: Monomial, pair: Pair) -> Iterator[tuple[int, int]]:
     """Yield pairs of factors: a sine or cosine of the first angle and one of the second."""
     known = {n: name for n in monomial if (name := angle(algebra, n)) in pair}
     for first, a in known.items():
@@ -76,9 +84,13 @@ def _of_both(algebra: Algebra, monomial: Monomial, pair: Pair) -> Iterator[tuple
 
 
 def _join(
-    algebra: Algebra, result: Polynomial, rest: Monomial, one: _Meeting, other: _Meeting
+    algebra: Algebra, result: Polynomial, rest: Monomial, one: _AnglePair, other: _AnglePair
 ) -> None:
-    """Join two terms of `result` in place if their coefficients agree, as cos cos - sin sin."""
+    """Replace two terms of the polynomial `result`, in place, by the cosine or sine of a sum.
+
+    `rest` is the common factor, `one` has the cosine of the second angle and `other` its sine.
+    Nothing changes if the coefficients do not match, as in cos cos - sin sin.
+    """
     builder = algebra.builder
     if any(result.get(m.monomial) != m.coefficient for m in (one, other)):
         return
@@ -107,22 +119,26 @@ def factor(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
 
     The factor that saves most products is factored out first. Products that are used several times
     are expanded too if this is not more expensive, because the same bracket may already exist.
+
+    Args:
+        graph: graph to transform.
+        parameters: names of the inputs that are constant from call to call.
     """
     names = tuple(parameters)
-    trials = (rewritten(graph, names, write) for write in (_opened_first, _opened_last))
+    # among equally cheap forms: the form with expanded products, or the form without
+    writers: tuple[Writer, ...] = (
+        lambda algebra, polynomial: algebra.cheapest(reversed(_forms(algebra, polynomial))),
+        lambda algebra, polynomial: algebra.cheapest(_forms(algebra, polynomial)),
+    )
+    trials = (rewritten(graph, names, write) for write in writers)
     return min(trials, key=lambda trial: count_graph(trial, names).total)
 
 
-def _opened_first(algebra: Algebra, polynomial: Polynomial) -> int:
-    """Write the cheapest form of a polynomial; among equals the form with expanded products."""
-    return algebra.cheapest(reversed(_forms(algebra, polynomial)))
-
-
-def _opened_last(algebra: Algebra, polynomial: Polynomial) -> int:
-    return algebra.cheapest(_forms(algebra, polynomial))
-
-
 def _forms(algebra: Algebra, polynomial: Polynomial) -> list[partial[int]]:
+    """Return callables that write a polynomial in factored form and return its node.
+
+    The second one, if any, expands products first.
+    """
     forms = [partial(_factor, algebra, polynomial)]
     opened = _open_products(algebra, polynomial)
     if opened != polynomial:
@@ -131,7 +147,7 @@ def _forms(algebra: Algebra, polynomial: Polynomial) -> list[partial[int]]:
 
 
 def _open_products(algebra: Algebra, polynomial: Polynomial) -> Polynomial:
-    """Expand the factors that are products, so that no factor of a term is a product."""
+    """Return the polynomial in which factors that are products themselves are expanded."""
     total: Polynomial = {}
     for monomial, coefficient in polynomial.items():
         factors: Monomial = ()
@@ -150,6 +166,10 @@ def _open_products(algebra: Algebra, polynomial: Polynomial) -> Polynomial:
 
 
 def _factor(algebra: Algebra, polynomial: Polynomial) -> int:
+    """Factor a polynomial greedily, write it as nodes and return the last node.
+
+    The factor that saves most products is factored out first.
+    """
     rest = dict(polynomial)
     for _ in range(_MOST_WORK // max(1, len(polynomial))):
         savings = _savings(algebra, rest)
@@ -161,7 +181,10 @@ def _factor(algebra: Algebra, polynomial: Polynomial) -> int:
 
 
 def _savings(algebra: Algebra, polynomial: Polynomial) -> Counter[int]:
-    """Return the products saved by factoring out each node, for nodes that save any."""
+    """Return the number of products that factoring out a node saves, by node.
+
+    Positive numbers only.
+    """
     savings: Counter[int] = Counter()
     for monomial, coefficient in polynomial.items():
         unit = algebra.is_unit(coefficient)
@@ -174,7 +197,7 @@ def _savings(algebra: Algebra, polynomial: Polynomial) -> Counter[int]:
 
 
 def _with_factor(algebra: Algebra, polynomial: Polynomial, number: int) -> Polynomial:
-    """Factor out a node: all its multiples in the polynomial become one product."""
+    """Return the polynomial in which all multiples of the node `number` are one product."""
     builder, rest = algebra.builder, dict(polynomial)
     bracket: Polynomial = {}
     for monomial, coefficient in polynomial.items():
@@ -191,7 +214,7 @@ def _with_factor(algebra: Algebra, polynomial: Polynomial, number: int) -> Polyn
 def _quotient(
     algebra: Algebra, monomial: Monomial, coefficient: int, number: int
 ) -> Polynomial | None:
-    """Divide a term by a node; return None if the node is not a factor."""
+    """Return the term (monomial times coefficient) divided by a node; None if it is no factor."""
     if number in monomial:
         return {without(monomial, number): coefficient}
     sign, unsigned = algebra.builder.unsigned(coefficient)
@@ -207,12 +230,16 @@ def fold(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
     """Evaluate constants, remove 0 and 1, move signs outwards, and merge equal nodes.
 
     A remaining sign is absorbed by a difference without other uses: -(x - y) becomes y - x.
+
+    Args:
+        graph: graph to transform.
+        parameters: names of the inputs that are constant from call to call.
     """
     return drop(_reverse_differences(drop(rebuild(graph, Builder(graph, parameters)))))
 
 
 def _reverse_differences(graph: Graph) -> Graph:
-    """Reverse differences of which only the negative is used."""
+    """Return the graph in which x - y becomes y - x if only its negative is used."""
     negated = {n.args[0] for n in graph.nodes if n.op == casadi.OP_NEG}
     plain = {number for result in graph.results for number in result}
     for number, node in enumerate(graph.nodes):
@@ -232,7 +259,7 @@ def _reverse_differences(graph: Graph) -> Graph:
 
 
 def _without_assignments(graph: Graph) -> Graph:
-    """Copy propagation: uses of an assignment refer to its operand."""
+    """Return the graph without assignments: copy propagation, uses refer to the operand."""
     target = list(range(len(graph.nodes)))
     nodes = list(graph.nodes)
     for number, node in enumerate(nodes):
@@ -252,15 +279,19 @@ _Rank = Callable[[int], tuple[int, ...]]
 
 
 def order(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
-    """Reorder operations so that fewer values are alive at once.
+    """Reorder operations so that fewer values are alive at once; `parameters` has no effect.
 
     Outputs are computed in order. Operands of commutative operations are exchanged so that the
     depth-first traversal of CasADi finds the same order.
 
     Source: Sethi & Ullman 1970; a shared node belongs to its first use.
+
+    Args:
+        graph: graph to transform.
+        parameters: names of inputs, not used.
     """
     graph = drop(graph)
-    room = _room(graph)
+    room = _registers(graph)
     deep = _depth(graph)
     ranks: list[_Rank] = [
         lambda number: (-room[number], number),
@@ -268,12 +299,16 @@ def order(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
         lambda number: (room[number], number),
         lambda number: (number,),
     ]
-    trials = [_walk(graph, rank) for rank in ranks]
+    trials = [_depth_first(graph, rank) for rank in ranks]
     return min([*trials, graph], key=waiting)
 
 
 def waiting(graph: Graph) -> int:
-    """Return the largest number of values alive at once, without inputs and constants."""
+    """Return the largest number of values that are alive at once, without inputs and constants.
+
+    Args:
+        graph: graph whose nodes are evaluated in order.
+    """
     last = list(range(len(graph.nodes)))
     for number in range(len(graph.nodes)):
         for operand in graph.operands(number):
@@ -288,8 +323,8 @@ def waiting(graph: Graph) -> int:
     return most
 
 
-def _room(graph: Graph) -> list[int]:
-    """Return the Sethi-Ullman number of each node: values alive at once, as if none were shared."""
+def _registers(graph: Graph) -> list[int]:
+    """Return the Sethi-Ullman number of each node: registers it needs if no node were shared."""
     room: list[int] = []
     for number, node in enumerate(graph.nodes):
         needs = sorted((room[a] for a in graph.operands(number)), reverse=True)
@@ -299,14 +334,18 @@ def _room(graph: Graph) -> list[int]:
 
 
 def _depth(graph: Graph) -> list[int]:
+    """Return for each node the number of operations on the longest path to it from a leaf."""
     depth: list[int] = []
     for number in range(len(graph.nodes)):
         depth.append(max((depth[a] + 1 for a in graph.operands(number)), default=0))
     return depth
 
 
-def _walk(graph: Graph, rank: _Rank) -> Graph:
-    """Return the graph in depth-first order from the outputs, operands of lower rank first."""
+def _depth_first(graph: Graph, rank: _Rank) -> Graph:
+    """Return the graph in depth-first order from the outputs.
+
+    `rank` maps a node index to a sort key; commutative operands of lower rank are computed first.
+    """
     operands = [graph.operands(number) for number in range(len(graph.nodes))]
     for number, node in enumerate(graph.nodes):
         if node.op in COMMUTATIVE:
@@ -336,20 +375,25 @@ def _walk(graph: Graph, rank: _Rank) -> Graph:
 def parameters(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
     """Reassociate products and sums so that parameter-only factors and terms are combined.
 
-    c1 (x c2) becomes (c1 c2) x, c1 x + c2 x becomes (c1 + c2) x, and c1 (c2 x + c3 y) becomes
-    (c1 c2) x + (c1 c3) y. Values with other uses are not computed a second time.
+    c1 (x c2) becomes (c1 c2) x, c1 x + c2 x becomes (c1 + c2) x, and c1 (c2 x + c3 y) becomes (c1
+    c2) x + (c1 c3) y. Values with other uses are not computed a second time.
+
+    Args:
+        graph: graph to transform.
+        parameters: names of the inputs that are constant from call to call.
     """
     return rewritten(graph, parameters, _gather)
 
 
 def _gather(algebra: Algebra, polynomial: Polynomial) -> int:
-    opened = _opened_parameters(algebra, polynomial)
+    """Write the cheaper form of a polynomial, with or without expanded sums; return the node."""
+    opened = _expanded_sums(algebra, polynomial)
     forms = [polynomial] if opened == polynomial else [polynomial, opened]
     return algebra.cheapest([partial(algebra.plain, form) for form in forms])
 
 
-def _opened_parameters(algebra: Algebra, polynomial: Polynomial) -> Polynomial:
-    """Expand the sums among the terms of a polynomial that have a monomial in common with it."""
+def _expanded_sums(algebra: Algebra, polynomial: Polynomial) -> Polynomial:
+    """Expand the terms of a polynomial that are sums and have a monomial in common with it."""
     total = dict(polynomial)
     for monomial, coefficient in polynomial.items():
         inside = algebra.written.get(monomial[0], {}) if len(monomial) == 1 else {}
@@ -368,12 +412,19 @@ def pythagoras(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
     With different coefficients, p1 s s x + p2 c c x becomes p1 x + (p2 - p1) c c x. Rotations of a
     vector back and forth thus cancel. Each angle is tried separately. The result is kept if the
     graph is cheaper.
+
+    Args:
+        graph: graph to transform.
+        parameters: names of the inputs that are constant from call to call.
     """
     return improved(graph, parameters, _reduce, lambda pair: pair[0] == pair[1])
 
 
 def _reduce(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polynomial:
-    """Reduce the squares of the sine and cosine of an angle where this saves operations."""
+    """Reduce the squares of sine and cosine of the angle `pair[0]` where this saves operations.
+
+    Return `polynomial` itself if nothing changes.
+    """
     opened = multiplied_out(algebra, polynomial, pair)
     result = dict(opened)
     for monomial in opened:
@@ -386,7 +437,11 @@ def _reduce(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polynomial:
 def _reduced_rest(
     algebra: Algebra, polynomial: Polynomial, number: int, rest: Monomial
 ) -> Polynomial:
-    """Return the cheapest form of the terms `rest`, c c `rest` and s s `rest`."""
+    """Return the cheapest equal form of a polynomial by c c + s s = 1, for one common factor.
+
+    `number` is a sine or cosine node of the angle, and `rest` the common factor of the terms rest,
+    c c rest and s s rest.
+    """
     builder = algebra.builder
     argument = builder.nodes[number].args[0]
     squares = [
@@ -416,9 +471,13 @@ _LONGEST_OPENED = (1, 8)
 def share(graph: Graph, parameters: Iterable[str] = ()) -> Graph:
     """Reassociate sums and products so that their common parts are computed once.
 
-    Sums are sets of signed terms and products are sets of factors. The pair of elements that
-    occurs in most sets becomes a node, until no pair occurs twice.
-    Source: Breuer 1969, generation of optimal code for expressions via factorization.
+    Sums are sets of signed terms and products are sets of factors. The pair of elements that occurs
+    in most sets becomes a node, until no pair occurs twice. Source: Breuer 1969, generation of
+    optimal code for expressions via factorization.
+
+    Args:
+        graph: graph to transform.
+        parameters: names of the inputs that are constant from call to call.
     """
     names = tuple(parameters)
     graph = fold(graph, names)
@@ -438,7 +497,7 @@ def _associate(graph: Graph, parameters: tuple[str, ...], ops: set[int], longest
         longest: largest number of elements of a group that is expanded although it has other uses.
     """
     fixed = graph.fixed_by(parameters)
-    groups = _opened_groups(graph, ops, fixed, longest)
+    groups = _merged_groups(graph, ops, fixed, longest)
     known: dict[int, Group] = {}
     for group in groups.values():
         _gather_fixed(group, fixed, known, len(graph.nodes))
@@ -447,10 +506,14 @@ def _associate(graph: Graph, parameters: tuple[str, ...], ops: set[int], longest
     return _write(graph, {**groups, **known}, Builder(graph, parameters), ops)
 
 
-def _opened_groups(
+def _merged_groups(
     graph: Graph, ops: set[int], fixed: list[bool], longest: int
 ) -> dict[int, Group]:
-    """Return the terms of each sum, or the factors of each product, that is not part of another."""
+    """Return the terms of each sum, or the factors of each product, by node index.
+
+    Sums within sums, used once or short, are merged. `ops` are the operations, `fixed` marks nodes
+    of parameters alone, and `longest` is the size up to which a group with other uses is merged.
+    """
     uses = graph.uses()
     groups: dict[int, Group] = {}
     part_of_another: set[int] = set()
@@ -460,7 +523,7 @@ def _opened_groups(
         signs = (1, -1 if node.op == casadi.OP_SUB else 1)
         for opened in ((0, 1), (0,), (1,), ()):
             parts = [
-                _part(groups, operand, position in opened, uses[operand] == 1, longest)
+                _group_elements(groups, operand, position in opened, uses[operand] == 1, longest)
                 for position, operand in enumerate(node.args)
             ]
             if not set(parts[0]) & set(parts[1]):
@@ -476,7 +539,14 @@ def _opened_groups(
     return {number: group for number, group in groups.items() if number not in part_of_another}
 
 
-def _part(groups: dict[int, Group], number: int, opened: bool, alone: bool, longest: int) -> Group:
+def _group_elements(
+    groups: dict[int, Group], number: int, opened: bool, alone: bool, longest: int
+) -> Group:
+    """Return the elements of the operand `number`: its own group if it is merged, else itself.
+
+    `opened` is whether it may be merged, `alone` whether it has no other use, and `longest` the
+    size up to which a group with other uses is merged.
+    """
     group = groups.get(number)
     if not opened or group is None or (not alone and len(group) > longest):
         return {number: 1}
@@ -484,7 +554,11 @@ def _part(groups: dict[int, Group], number: int, opened: bool, alone: bool, long
 
 
 def _gather_fixed(group: Group, fixed: list[bool], known: dict[int, Group], first: int) -> None:
-    """Replace the parameter-only elements of a group by a single element, in place."""
+    """Replace the parameter-only elements of a group by one new group, in place.
+
+    The new group is added to `known` under the next index after `first`. `fixed` marks
+    parameter-only nodes.
+    """
     together = {e: s for e, s in group.items() if fixed[e]}
     if len(together) < 2:
         return
@@ -496,7 +570,10 @@ def _gather_fixed(group: Group, fixed: list[bool], known: dict[int, Group], firs
 
 
 def _write(graph: Graph, groups: dict[int, Group], builder: Builder, ops: set[int]) -> Graph:
-    """Return the graph in which each group is computed element by element."""
+    """Return the graph in which each group is computed element by element.
+
+    Groups are sums or products, according to `ops`.
+    """
     numbers: dict[int, int] = {}
 
     def write(name: int) -> None:
@@ -512,14 +589,14 @@ def _write(graph: Graph, groups: dict[int, Group], builder: Builder, ops: set[in
             total = combine(total, value if sign > 0 else builder.negative(value))
         numbers[name] = total
 
-    for name in _in_order(graph, groups):
+    for name in _operands_first(graph, groups):
         write(name)
     results = [[numbers[n] for n in result] for result in graph.results]
     return graph.with_nodes(builder.nodes, results)
 
 
-def _in_order(graph: Graph, groups: dict[int, Group]) -> Iterator[int]:
-    """Yield the nodes and groups that the outputs need, operands first."""
+def _operands_first(graph: Graph, groups: dict[int, Group]) -> Iterator[int]:
+    """Yield the indices of nodes and groups that the outputs need, operands first."""
     done: set[int] = set()
     stack = [number for result in reversed(graph.results) for number in reversed(result)]
     while stack:

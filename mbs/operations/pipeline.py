@@ -140,29 +140,41 @@ def simplification(
     passes: Iterable[str] | None = None,
     parameters: Iterable[str] = ("p",),
 ) -> Simplification:
-    """Simplify a Function as `simplify` does, with a report of the operations that passes save.
+    """Simplify a Function as `simplify` does, and report the operations that each pass saves.
 
     Passes are repeated until none saves further operations. Each result is compared with the given
     Function at random points. It is discarded if it needs more operations.
+
+    Args:
+        function: Function of scalar operations, or a Function that can be expanded to them.
+        passes: names of passes, see `PASSES`; default: all.
+        parameters: names of inputs that are constant from call to call.
+
+    Raises:
+        ModelError: the Function has no scalar operations or no finite values, or a pass is unknown.
     """
-    chosen, names = _choose(passes), tuple(parameters)
+    chosen, names = _select_passes(passes), tuple(parameters)
     graph, steps = graph_of(function), list[PassReport]()
     proof = witness(function)
     simplifying = [p for p in chosen if p.name != "order"]
     idle = 0
     for number in range(_MOST_ROUNDS * len(simplifying)):
-        graph, step = _make(simplifying[number % len(simplifying)], graph, names, proof)
+        graph, step = _try_pass(simplifying[number % len(simplifying)], graph, names, proof)
         steps.append(step)
         idle = 0 if step.kept and step.after.total < step.before.total else idle + 1
         if idle == len(simplifying):
             break
     for last in (p for p in chosen if p.name == "order"):
-        graph, step = _make(last, graph, names, proof)
+        graph, step = _try_pass(last, graph, names, proof)
         steps.append(step)
     return Simplification(_function_like(function, graph), graph, tuple(steps))
 
 
-def _choose(passes: Iterable[str] | None) -> Sequence[Pass]:
+def _select_passes(passes: Iterable[str] | None) -> Sequence[Pass]:
+    """Return the passes with the given names, in the order of PASSES; all passes for None.
+
+    Raise ModelError if a name is unknown.
+    """
     if passes is None:
         return PASSES
     chosen, known = set(passes), [p.name for p in PASSES]
@@ -171,9 +183,14 @@ def _choose(passes: Iterable[str] | None) -> Sequence[Pass]:
     return [p for p in PASSES if p.name in chosen]
 
 
-def _make(
+def _try_pass(
     one: Pass, graph: Graph, parameters: tuple[str, ...], proof: Witness
 ) -> tuple[Graph, PassReport]:
+    """Apply the pass `one` to a graph; return the graph to continue with, and a report.
+
+    The result is kept if it is cheaper. A kept result whose values differ from `proof` raises
+    ModelError.
+    """
     started = time.perf_counter()
     made = one.apply(graph, parameters)
     before, after = count_graph(graph, parameters), count_graph(made, parameters)
@@ -187,7 +204,10 @@ def _make(
 
 
 def _function_like(function: Function, graph: Graph) -> Function:
-    """Return the Function of a graph, with defaults (for models also checks) of `function`."""
+    """Return the Function of a graph, with the default inputs of `function`.
+
+    A model also keeps its checks.
+    """
     defaults = [function.default_in(k) for k in range(function.n_in())]
     made = function_of(graph, defaults)
     rewritten: Any = getattr(function, "rewritten", None)
@@ -249,7 +269,7 @@ def split(function: Function, parameters: Iterable[str] = ("p",)) -> Split:
         raise ModelError(
             f"{function.name()}: its input c has the name of what is computed once; rename it"
         )
-    kept = _needed_of_parameters(graph, names)
+    kept = _parameter_nodes(graph, names)
     column = Port(_CONSTANTS, Sparsity.dense(len(kept), 1))
     setup = function_of(_setup(graph, names, kept, column))
     like = getattr(function, "like", None)
@@ -260,8 +280,11 @@ def split(function: Function, parameters: Iterable[str] = ("p",)) -> Split:
     )
 
 
-def _needed_of_parameters(graph: Graph, names: set[str]) -> list[int]:
-    """Return the parameter-only nodes that outputs or changing nodes use, without constants."""
+def _parameter_nodes(graph: Graph, names: set[str]) -> list[int]:
+    """Return the parameter-only nodes that outputs or other nodes use, without constants.
+
+    `names` are the names of the parameters.
+    """
     fixed = graph.fixed_by(names)
     used = [number for result in graph.results for number in result]
     for number in range(len(graph.nodes)):
@@ -271,14 +294,20 @@ def _needed_of_parameters(graph: Graph, names: set[str]) -> list[int]:
 
 
 def _setup(graph: Graph, names: set[str], kept: list[int], column: Port) -> Graph:
-    """Return the graph that computes the kept nodes from the parameters."""
+    """Return the graph that computes the nodes `kept` from the parameters, as the output `column`.
+
+    `names` are the names of the parameters.
+    """
     inputs = tuple(port for port in graph.inputs if port.name in names)
     nodes = _renumber(graph, [port.name for port in inputs])
     return Graph(f"{graph.name}_setup", inputs, (column,), nodes, (tuple(kept),))
 
 
 def _main(graph: Graph, names: set[str], kept: list[int], column: Port) -> Graph:
-    """Return the graph whose last input contains the kept nodes."""
+    """Return the graph of the other operations, whose last input `column` has the nodes `kept`.
+
+    `names` are the names of the parameters.
+    """
     inputs = tuple(port for port in graph.inputs if port.name not in names)
     nodes = list(_renumber(graph, [port.name for port in inputs]))
     for position, number in enumerate(kept):
@@ -287,7 +316,10 @@ def _main(graph: Graph, names: set[str], kept: list[int], column: Port) -> Graph
 
 
 def _renumber(graph: Graph, names: list[str]) -> tuple[Node, ...]:
-    """Return nodes in which input indices refer to `names`; other nodes are unchanged."""
+    """Return the nodes of a graph for the inputs `names` in this order.
+
+    Other inputs are unchanged.
+    """
     index = {k: names.index(p.name) for k, p in enumerate(graph.inputs) if p.name in names}
 
     def renumber(node: Node) -> Node:
@@ -324,8 +356,8 @@ def names_found(function: Function, named: Function) -> Function:
     points = witness(named).points
     target = np.array([_scalars(named, point, count) for point in points]).T
     computed = _values(graph, points)
-    same = _find(graph, target, computed)
-    others = _find(graph, -target, computed)
+    same = _match_scalars(graph, target, computed)
+    others = _match_scalars(graph, -target, computed)
     known = set(same.values())
     nodes, named_nodes = list(graph.nodes), dict(same)
     for k, number in others.items():
@@ -344,20 +376,26 @@ def names_found(function: Function, named: Function) -> Function:
 
 
 def _scalars(named: Function, point: Sequence[DM], count: int) -> NDArray[np.float64]:
-    """Return the named scalars at a point; NaN for outputs that are not scalar."""
+    """Return the named scalars at a point; NaN for outputs that are not scalar.
+
+    `count` is the number of outputs of `named` before the named scalars.
+    """
     outputs = Function.call(named, list(point))[count:]
     return np.array([float(x) if x.shape == (1, 1) else np.nan for x in outputs])
 
 
 def _values(graph: Graph, points: Sequence[Sequence[DM]]) -> NDArray[np.float64]:
-    """Return the values of all nodes at all points, (nodes, points)."""
+    """Return the non-zero elements of each output of a Function at a point.
+
+    `point` has one value per input.
+    """
     size = len(graph.nodes)
     port, numbers = Port("nodes", Sparsity.dense(size, 1)), tuple(range(size))
     every = function_of(replace(graph, outputs=(port,), results=(numbers,)))
     return np.hstack([np.array(Function.call(every, list(point))[0]) for point in points])
 
 
-def _find(
+def _match_scalars(
     graph: Graph, target: NDArray[np.float64], computed: NDArray[np.float64]
 ) -> dict[int, int]:
     """Return the first node with the same values for each named scalar that is not constant.
@@ -444,7 +482,10 @@ class Witness:
                 )
 
     def _rounding(self, output: int) -> float:
-        """Return the change of an output by perturbed inputs: the rounding error of a zero."""
+        """Return the largest change of an output, times 10, by tiny random changes of the inputs.
+
+        It bounds the rounding error of an output that should be zero. `output` is its index.
+        """
         random, found = np.random.default_rng(0), 0.0
         for point, expected in zip(self.points, self.values, strict=True):
             for _ in range(_NUDGES):
@@ -455,7 +496,11 @@ class Witness:
 
 
 def witness(function: Function, seed: int = 0) -> Witness:
-    """Evaluate a Function at random points at which its elements are finite, or most of them.
+    """Evaluate a Function at three random points at which all, or most, of its elements are finite.
+
+    Args:
+        function: Function to evaluate.
+        seed: seed of the random numbers.
 
     Raises:
         ModelError: no output element is finite at any of many points.
@@ -488,10 +533,14 @@ def _evaluated(function: Function, point: Sequence[DM]) -> Values:
 
 
 def _within(one: np.ndarray, other: np.ndarray, allowed: float) -> bool:
-    """Return whether two arrays differ by at most `allowed` where the first is finite."""
+    """Return whether two arrays differ by at most `allowed`.
+
+    Elements where `one` is not finite pass.
+    """
     known = np.isfinite(one)
     return bool(np.all(np.abs(one[known] - other[known]) <= allowed))
 
 
 def _largest(values: np.ndarray) -> float:
+    """Return the largest magnitude of the finite elements; zero if there are none."""
     return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))

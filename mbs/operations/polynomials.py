@@ -53,7 +53,14 @@ class Algebra:
         self.one = builder.constant(1.0)
 
     def read(self, number: int) -> Polynomial:
-        """Return a node as coefficient times indeterminate; a coefficient only if it is fixed."""
+        """Return a node as a polynomial of one term: coefficient times another node.
+
+        Signs and parameter-only factors join the coefficient. A parameter-only node is a constant
+        term.
+
+        Args:
+            number: index of a node.
+        """
         builder, coefficient = self.builder, self.one
         while not builder.fixed[number]:
             node = builder.nodes[number]
@@ -70,14 +77,23 @@ class Algebra:
         return {(): builder.product(coefficient, number)}
 
     def indeterminate(self, number: int) -> Polynomial:
-        """Return a node as an indeterminate with a sign; as a coefficient if it is fixed."""
+        """Return a node as a polynomial of one term: 1 or -1 times the node.
+
+        A parameter-only node is a constant term.
+
+        Args:
+            number: index of a node.
+        """
         if self.builder.fixed[number]:
             return {(): number}
         sign, number = self.builder.unsigned(number)
         return {(number,): self.one if sign > 0 else self.builder.constant(-1.0)}
 
     def opened(self, polynomial: Polynomial) -> Polynomial:
-        """Return the polynomial with indeterminates c x of other nodes x written as c times x."""
+        """Return the polynomial in which indeterminates of the form c x are written as c times x.
+
+        c is a parameter-only coefficient.
+        """
         total: Polynomial = {}
         for monomial, coefficient in polynomial.items():
             read = self.read(monomial[0]) if len(monomial) == 1 else {monomial: self.one}
@@ -85,16 +101,19 @@ class Algebra:
         return total
 
     def is_unit(self, coefficient: int) -> bool:
-        """Return whether a coefficient is 1 or -1."""
+        """Return whether the node `coefficient` is the constant 1 or -1."""
         return self.builder.value(coefficient) in (1.0, -1.0)
 
     def cost(self, polynomial: Polynomial) -> int:
-        """Return the number of operations of the plain sum of terms."""
+        """Return the number of operations that computing a polynomial term by term takes."""
         products = (len(m) - self.is_unit(c) for m, c in polynomial.items() if m)
         return sum(products) + len(polynomial) - 1
 
     def accumulate(self, total: Polynomial, terms: Iterable[tuple[Monomial, int]]) -> None:
-        """Add terms to a polynomial, in place; terms that cancel are removed."""
+        """Add terms (monomial, coefficient) to the polynomial `total`, in place.
+
+        Zero terms are removed.
+        """
         for monomial, coefficient in terms:
             if monomial in total:
                 coefficient = self.builder.sum(total.pop(monomial), coefficient)
@@ -102,14 +121,18 @@ class Algebra:
                 total[monomial] = coefficient
 
     def scaled(self, polynomial: Polynomial, factor: int) -> Polynomial:
-        """Return a polynomial times a coefficient."""
+        """Return a polynomial times the coefficient node `factor`."""
         if factor == self.one:
             return dict(polynomial)
         products = ((m, self.builder.product(c, factor)) for m, c in polynomial.items())
         return {m: c for m, c in products if self.builder.value(c) != 0.0}
 
     def monomial(self, monomial: Monomial) -> int:
-        """Write a monomial as nodes; powers are computed by squaring."""
+        """Write a product of nodes and return its node; powers are computed by squaring.
+
+        Args:
+            monomial: node indices of the factors.
+        """
         if len(set(monomial)) == len(monomial):
             return self._product(monomial)
         powers = Counter(monomial)
@@ -119,18 +142,23 @@ class Algebra:
         return self.builder.product(single, square)
 
     def _product(self, numbers: Iterable[int]) -> int:
+        """Write the product of nodes and return its node; 1 without nodes."""
         result = -1
         for number in numbers:
             result = self.builder.product(result, number) if result >= 0 else number
         return result if result >= 0 else self.one
 
     def term(self, monomial: Monomial, coefficient: int) -> int:
-        """Write coefficient times monomial as nodes."""
+        """Write coefficient times monomial and return its node."""
         product = self.monomial(monomial)
         return product if coefficient == self.one else self.builder.product(coefficient, product)
 
     def cheapest(self, forms: Iterable[Callable[[], int]]) -> int:
-        """Write the form with the fewest new operations (the first of equals); return its node."""
+        """Write the form with the fewest new operations (the first of equals) and return its node.
+
+        Args:
+            forms: callables that write equal values; each returns the index of its node.
+        """
         start = len(self.builder.nodes)
         tried = []
         for form in forms:
@@ -140,13 +168,14 @@ class Algebra:
         return min(tried, key=lambda trial: trial[0])[1]()
 
     def _forget_since(self, start: int) -> None:
+        """Remove all nodes with index `start` or more, with their polynomials and names."""
         for number in range(start, len(self.builder.nodes)):
             for memory in (self.written, self.names, self.angles_within):
                 memory.pop(number, None)
         self.builder.forget_since(start)
 
     def plain(self, polynomial: Polynomial) -> int:
-        """Write a polynomial as the sum of its terms."""
+        """Write a polynomial as the sum of its terms and return its node."""
         total = -1
         for monomial, coefficient in polynomial.items():
             term = self.term(monomial, coefficient)
@@ -155,12 +184,12 @@ class Algebra:
 
 
 def rewritten(graph: Graph, parameters: Iterable[str], write: Writer) -> Graph:
-    """Return a graph in which a callable writes every polynomial.
+    """Return an equal graph in which a callable writes every polynomial as nodes.
 
     Args:
         graph: graph to rewrite.
         parameters: names of the inputs that coefficients may depend on.
-        write: callable that writes a polynomial.
+        write: callable (algebra, polynomial) -> index of the node of the polynomial.
     """
     return _Rewriting(graph, Algebra(Builder(graph, parameters)), write).graph()
 
@@ -186,6 +215,7 @@ class _Rewriting:
         return drop(self._old.with_nodes(self._builder.nodes, results))
 
     def _form(self, number: int) -> Polynomial:
+        """Return the polynomial of node `number` of the old graph."""
         node, operands = self._old.nodes[number], self._old.operands(number)
         form = None
         if node.op in _POLYNOMIAL_OPS:
@@ -198,6 +228,7 @@ class _Rewriting:
         return form
 
     def _number(self, form: Polynomial) -> int:
+        """Write a polynomial as nodes of the new graph and return the index of its node."""
         if not form:
             return self._builder.constant(0.0)
         if len(form) == 1:
@@ -212,7 +243,7 @@ class _Rewriting:
         return number
 
     def _combine(self, op: int, forms: list[Polynomial]) -> Polynomial | None:
-        """Apply an operation to polynomials; return None if the result is no polynomial."""
+        """Apply the operation `op` to polynomials; return None if the result is no polynomial."""
         first, *others = forms
         second = others[0] if others else first
         if op == casadi.OP_ASSIGN:
@@ -229,7 +260,10 @@ class _Rewriting:
         return self._plus(first, second, sign)
 
     def _plus(self, first: Polynomial, second: Polynomial, sign: int) -> Polynomial:
-        """Return first + sign second; the longer polynomial is changed in place."""
+        """Return first + sign second, where `sign` is a node of 1 or -1.
+
+        The longer polynomial is changed in place.
+        """
         if len(second) > _LONGEST_NEGATED and sign != self._algebra.one:
             second = self._algebra.indeterminate(self._number(second))
         scaled = second if sign == self._algebra.one else self._algebra.scaled(second, sign)
@@ -241,40 +275,51 @@ class _Rewriting:
         return longer
 
     def _over(self, first: Polynomial, second: Polynomial) -> Polynomial | None:
-        """Return a quotient by a coefficient as a product; None for other divisors."""
+        """Return the quotient first / second as a polynomial.
+
+        None if the divisor is no coefficient.
+        """
         if not _is_coefficient(second):
             return None
         inverse = self._builder.apply(casadi.OP_INV, second[()])
         return self._times(first, {(): inverse})
 
     def _times(self, first: Polynomial, second: Polynomial) -> Polynomial:
+        """Return the product of two polynomials.
+
+        A sum that is not scaled by terms becomes a node.
+        """
         if not first or not second:
             return {}
         for one, other in ((first, second), (second, first)):
-            if _is_coefficient(one) and self._bears(other):
+            if _is_coefficient(one) and self._scales_by_terms(other):
                 other = self._algebra.opened(other) if len(other) == 1 else other
                 return self._algebra.scaled(other, one[()])
         (m1, c1), (m2, c2) = self._single(first), self._single(second)
         return {tuple(sorted(m1 + m2)): self._builder.product(c1, c2)}
 
-    def _bears(self, form: Polynomial) -> bool:
-        """Return whether scaling each term costs no more than scaling the sum."""
+    def _scales_by_terms(self, form: Polynomial) -> bool:
+        """Return whether scaling each term of a polynomial costs no more than scaling its sum."""
         units = sum(1 for m, c in form.items() if m and self._algebra.is_unit(c))
         return units <= 1
 
     def _single(self, form: Polynomial) -> tuple[Monomial, int]:
-        """Return a polynomial as a single term; a sum is written as a node."""
+        """Return a polynomial as a single term (monomial, coefficient).
+
+        A sum is written as a node.
+        """
         if len(form) > 1:
             form = self._algebra.indeterminate(self._number(form))
         return next(iter(form.items()))
 
 
 def _is_coefficient(form: Polynomial) -> bool:
+    """Return whether a polynomial is a constant term."""
     return len(form) == 1 and () in form
 
 
 def without(monomial: Monomial, *factors: int) -> Monomial:
-    """Return a monomial without some of its factors."""
+    """Return a monomial without some of its factors. Raise ValueError if one is not contained."""
     rest = list(monomial)
     for factor in factors:
         rest.remove(factor)
@@ -298,7 +343,12 @@ _MOST_WORK = 40_000
 
 
 def angle(algebra: Algebra, number: int) -> str:
-    """Return a name of the angle of a sine or cosine, equal for equal expressions; else empty."""
+    """Return a text that identifies the angle of a sine or cosine; empty for another node.
+
+    Args:
+        algebra: algebra with the nodes.
+        number: index of a node.
+    """
     node = algebra.builder.nodes[number]
     if node.op not in (casadi.OP_SIN, casadi.OP_COS):
         return ""
@@ -306,17 +356,29 @@ def angle(algebra: Algebra, number: int) -> str:
 
 
 def angles_in(algebra: Algebra, monomial: Monomial) -> set[str]:
-    """Return the names of the angles whose sines or cosines are factors of a monomial."""
+    """Return the texts (see `angle`) of the angles whose sines or cosines are in a monomial.
+
+    Args:
+        algebra: algebra with the nodes.
+        monomial: node indices of the factors.
+    """
     return {name for number in monomial if (name := angle(algebra, number))}
 
 
 def angles_met(algebra: Algebra, polynomial: Polynomial) -> set[Pair]:
-    """Return the pairs of angles that occur in a product, directly or within a factor."""
+    """Return the pairs of angles that occur in a product, directly or within a factor.
+
+    Pairs consist of two texts, see `angle`, in alphabetical order.
+
+    Args:
+        algebra: algebra with the nodes.
+        polynomial: polynomial to search.
+    """
     met: set[Pair] = set()
     for monomial in polynomial:
         inner: set[str] = set()
         for factor in monomial:
-            inner |= _within(algebra, factor)
+            inner |= _angles_within(algebra, factor)
         outer = inner if len(monomial) == 1 else angles_in(algebra, monomial)
         inner |= outer
         met |= {(min(a, b), max(a, b)) for a in outer for b in inner}
@@ -327,6 +389,11 @@ def multiplied_out(algebra: Algebra, polynomial: Polynomial, pair: Pair) -> Poly
     """Expand the factors that contain one angle of a pair if the other angle is a factor too.
 
     Nested products are expanded. In each term at most one sum is expanded.
+
+    Args:
+        algebra: algebra with the nodes.
+        polynomial: polynomial to expand.
+        pair: texts of the two angles.
     """
     total: Polynomial = {}
     waiting = [(monomial, c, True) for monomial, c in reversed(polynomial.items())]
@@ -364,9 +431,9 @@ def improved(
     Args:
         graph: graph to transform.
         parameters: names of the inputs that are constant.
-        reshape: callable (pair, algebra, polynomial) -> transformed polynomial. It returns an
-            equal polynomial if nothing changes.
-        pairs: callable that returns whether a pair is to be tried.
+        reshape: callable (pair, algebra, polynomial) -> transformed polynomial. It returns an equal
+            polynomial if nothing changes.
+        pairs: callable (pair of angles) -> whether it is tried.
     """
     names, met = tuple(parameters), Counter[Pair]()
 
@@ -389,6 +456,11 @@ def improved(
 
 
 def _writer(reshape: Reshape, allowance: int) -> Callable[[Algebra, Polynomial], int]:
+    """Return a callable that writes a polynomial transformed by `reshape`.
+
+    The polynomial is written untransformed if the other costs over `allowance` more operations.
+    """
+
     def write(algebra: Algebra, polynomial: Polynomial) -> int:
         reshaped = reshape(algebra, polynomial)
         dearest = algebra.cost(polynomial) + allowance
@@ -399,7 +471,11 @@ def _writer(reshape: Reshape, allowance: int) -> Callable[[Algebra, Polynomial],
 
 
 def _factor_with(algebra: Algebra, monomial: Monomial, pair: Pair, opens_sums: bool) -> int | None:
-    """Return a factor to expand: it contains one angle of a pair while the other is a factor."""
+    """Return a factor of a monomial to expand for a pair of angles; None if there is none.
+
+    The factor contains one angle of the pair, and the other angle is a factor too. `opens_sums` is
+    whether sums may be expanded, not only products.
+    """
     if len(monomial) > _LONGEST_MONOMIAL:
         return None
     present = angles_in(algebra, monomial)
@@ -407,14 +483,14 @@ def _factor_with(algebra: Algebra, monomial: Monomial, pair: Pair, opens_sums: b
     for factor in monomial:
         inside = algebra.written.get(factor, {})
         if len(inside) == 1 or (inside and opens_sums):
-            within = _within(algebra, factor)
+            within = _angles_within(algebra, factor)
             if within & partners or (len(inside) == 1 and within & set(pair)):
                 return factor
     return None
 
 
-def _within(algebra: Algebra, factor: int, depth: int = _DEEPEST_PRODUCT) -> frozenset[str]:
-    """Return the angles of the factors in the polynomial of a node, nested products expanded."""
+def _angles_within(algebra: Algebra, factor: int, depth: int = _DEEPEST_PRODUCT) -> frozenset[str]:
+    """Return the angles in the polynomial of a node, products expanded to the nesting `depth`."""
     known = algebra.angles_within.get(factor)
     if known is None:
         names: set[str] = set()
@@ -422,24 +498,27 @@ def _within(algebra: Algebra, factor: int, depth: int = _DEEPEST_PRODUCT) -> fro
             names |= angles_in(algebra, monomial)
             for inner in monomial if depth else ():
                 if len(algebra.written.get(inner, ())) == 1:
-                    names |= _within(algebra, inner, depth - 1)
+                    names |= _angles_within(algebra, inner, depth - 1)
         known = algebra.angles_within[factor] = frozenset(names)
     return known
 
 
 def _name(algebra: Algebra, number: int) -> str:
-    """Return a text of the expression that a node computes; empty if it is too deep."""
+    """Return a text of the expression that a node computes; empty if it is nested too deeply."""
     known = algebra.names.get(number)
     if known is None:
-        known = algebra.names[number] = _spelt(algebra, number, _DEEPEST_NAME)
+        known = algebra.names[number] = _expression_text(algebra, number, _DEEPEST_NAME)
     return known
 
 
-def _spelt(algebra: Algebra, number: int, depth: int) -> str:
+def _expression_text(algebra: Algebra, number: int, depth: int) -> str:
+    """Return a text of the expression that a node computes; empty if nested deeper than `depth`."""
     node = algebra.builder.nodes[number]
     if node.op in (casadi.OP_INPUT, casadi.OP_CONST):
         return f"{node.op} {node.args} {node.value}"
-    parts = [_spelt(algebra, operand, depth - 1) for operand in node.args] if depth else [""]
+    parts = (
+        [_expression_text(algebra, operand, depth - 1) for operand in node.args] if depth else [""]
+    )
     if node.op != casadi.OP_SUB:
         parts.sort()
     return f"({node.op} {' '.join(parts)})" if all(parts) else ""
@@ -458,11 +537,11 @@ _LONGEST = 48
 
 
 def extract_pairs(groups: dict[int, Group], first_name: int) -> None:
-    """Replace common parts of groups by new groups, in place.
+    """Replace common parts of sums or products by new groups, in place.
 
-    The pair of elements that occurs most often, up to a common sign, becomes a group, until no
-    pair occurs twice. Only the first elements of a long group are considered, so that the work
-    grows with the number of elements.
+    The pair of elements that occurs most often, up to a common sign, becomes a group, until no pair
+    occurs twice. Only the first elements of a long group are considered, so that the work grows
+    with the number of elements.
 
     Args:
         groups: groups by name; the new groups are added.
@@ -476,6 +555,8 @@ def extract_pairs(groups: dict[int, Group], first_name: int) -> None:
 
 
 class _Extraction:
+    """Replacement of the most frequent pair of elements in groups by a new group."""
+
     def __init__(self, groups: dict[int, Group]) -> None:
         self._groups = groups
         self._holders: dict[_Pair, dict[int, None]] = defaultdict(dict)
@@ -487,7 +568,7 @@ class _Extraction:
         heapq.heapify(self._queue)
 
     def most_common(self) -> _Pair | None:
-        """Return a most frequent pair; None if no pair occurs twice."""
+        """Return the most frequent pair (a, b, sign); None if no pair occurs twice."""
         while self._queue:
             count, pair = heapq.heappop(self._queue)
             occurrences = len(self._holders.get(pair, ()))
@@ -498,18 +579,19 @@ class _Extraction:
         return None
 
     def replace(self, pair: _Pair, name: int) -> None:
-        """Make a pair a new group, and replace it by one element in the groups that contain it."""
+        """Make a pair a new group `name`; one element replaces it in all groups that contain it."""
         a, b, sign = pair
         for holder in list(self._holders.pop(pair)):
             group = self._groups[holder]
             outer = group[a]
-            self._forget(holder, group, a, b)
+            self._remove_pairs(holder, group, a, b)
             del group[a], group[b]
-            self._notice(holder, group, name, outer)
+            self._record_pairs(holder, group, name, outer)
             group[name] = outer
         self._groups[name] = {a: 1, b: sign}
 
-    def _forget(self, holder: int, group: Group, a: int, b: int) -> None:
+    def _remove_pairs(self, holder: int, group: Group, a: int, b: int) -> None:
+        """Remove the pairs of elements a or b with the other elements of the group `holder`."""
         for other, sign in group.items():
             for gone in (a, b):
                 if other != gone:
@@ -518,7 +600,11 @@ class _Extraction:
                     if holders is not None:
                         holders.pop(holder, None)
 
-    def _notice(self, holder: int, group: Group, name: int, outer: int) -> None:
+    def _record_pairs(self, holder: int, group: Group, name: int, outer: int) -> None:
+        """Record the pairs of the new element `name` with the elements of the group `holder`.
+
+        `outer` is the sign of the new element.
+        """
         for other in list(group)[:_LONGEST]:
             pair = (other, name, group[other] * outer)
             holders = self._holders[pair]

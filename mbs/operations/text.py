@@ -53,7 +53,10 @@ class Infix:
         self._graph, self._inputs = graph, inputs
 
     def text(self, number: int, tightness: int = SUM) -> str:
-        """Return the text of a node, in brackets if it binds weaker than `tightness`."""
+        """Return the text of node `number`, in brackets if it binds weaker than `tightness`.
+
+        `tightness` is SUM, NEGATIVE, PRODUCT, POWER or ATOM, from weak to strong.
+        """
         text, own = self._write(number)
         return f"({text})" if own < tightness else text
 
@@ -62,6 +65,7 @@ class Infix:
         return self._expression(self._graph.nodes[number])
 
     def _expression(self, node: Node) -> tuple[str, int]:
+        """Return the text of a node and its binding strength."""
         if node.op == casadi.OP_CONST:
             return f"{node.value:.12g}", ATOM if node.value >= 0 else NEGATIVE
         if node.op == casadi.OP_INPUT:
@@ -75,4 +79,5 @@ class Infix:
         return f"{self._call_text(node.op)}({', '.join(map(self.text, node.args))})", ATOM
 
     def _call_text(self, op: int) -> str:
+        """Return the name of the operation `op` in a function call."""
         return NAMES[op]

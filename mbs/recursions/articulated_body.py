@@ -58,7 +58,7 @@ class ArticulatedInertia:
 
     @staticmethod
     def of(body: Inertia) -> ArticulatedInertia:
-        """Return the articulated inertia of a single rigid body."""
+        """Return the articulated inertia of a single rigid body, in the same frame."""
         return ArticulatedInertia(
             casadi.densify(body.m * SX.eye(3)), casadi.densify(-skew(body.ms)), body.J
         )
@@ -68,19 +68,33 @@ class ArticulatedInertia:
         return ArticulatedInertia(self.M + other.M, self.H + other.H, self.J + other.J)
 
     def rotate(self, R: Rotation) -> ArticulatedInertia:
-        """Express in the axes of frame i, where R is the orientation of the current axes in i."""
+        """Transform to axes with the same origin.
+
+        R maps a vector from current axes to the new axes.
+        """
         return ArticulatedInertia(
             R.apply_to_tensor(self.M), R.apply_to_square(self.H), R.apply_to_tensor(self.J)
         )
 
     def shift(self, axis: int, t: SX) -> ArticulatedInertia:
-        """Displace the body by t [m] along a coordinate axis, with ten products."""
+        """Return the inertia of the body displaced by t along an axis, about the same origin.
+
+        The cost is ten products.
+
+        Args:
+            axis: index of the axis: 0, 1 or 2 for x, y or z.
+            t: displacement [m].
+        """
         if t.is_zero():
             return self
-        return ArticulatedInertia(self.M, *_slid(self.M, self.H, self.J, t, axis))
+        return ArticulatedInertia(self.M, *_translated(self.M, self.H, self.J, t, axis))
 
     def column(self, direction: int) -> SX:
-        """(6, 1) wrench of a unit acceleration along one component (0 to 5) of a twist."""
+        """Return the wrench (6, 1), force then moment, of a unit acceleration in one direction.
+
+        Args:
+            direction: index of the direction in a twist [linear; angular], 0 to 5.
+        """
         if direction < 3:
             return casadi.vertcat(self.M[:, direction], self.H[direction, :].T)
         return casadi.vertcat(self.H[:, direction - 3], self.J[:, direction - 3])
@@ -90,15 +104,19 @@ class ArticulatedInertia:
 
         The body then resists motion along this direction by the inertia of the drive only.
         """
-        felt = _without(
+        felt = _eliminated(
             self.M, self.H, self.J, pivot.column, pivot.gain, pivot.rest, pivot.direction
         )
         return ArticulatedInertia(*felt)
 
 
 @formula((3, 3), (3, 3), (3, 3), (1, 1))
-def _slid(M: SX, old: SX, tensor: SX, t: SX, axis: int) -> tuple[SX, SX]:
-    """Return H and J of an articulated body displaced by t [m] along a coordinate axis."""
+def _translated(M: SX, old: SX, tensor: SX, t: SX, axis: int) -> tuple[SX, SX]:
+    """Return the blocks H and J of an articulated inertia whose body is displaced along an axis.
+
+    `M`, `old` and `tensor` (3, 3) are the present blocks M, H and J of `ArticulatedInertia`. The
+    displacement is t [m] along the axis 0, 1 or 2.
+    """
     k, h = (axis + 1) % 3, (axis + 2) % 3
     H, J = SX(old), SX(tensor)
     H[:, k] -= t * M[:, h]
@@ -113,10 +131,13 @@ def _slid(M: SX, old: SX, tensor: SX, t: SX, axis: int) -> tuple[SX, SX]:
 
 
 @formula((3, 3), (3, 3), (3, 3), (6, 1), (6, 1), (6, 1))
-def _without(M: SX, H: SX, J: SX, column: SX, g: SX, own: SX, direction: int) -> tuple[SX, SX, SX]:
-    """Return M, H and J of an articulated body after elimination of a joint velocity.
+def _eliminated(
+    M: SX, H: SX, J: SX, column: SX, g: SX, own: SX, direction: int
+) -> tuple[SX, SX, SX]:
+    """Return the blocks M, H and J (3, 3) of an articulated inertia without one joint velocity.
 
-    Arguments `column`, `g` and `own` are column, gain and rest of its `Pivot`.
+    The velocity has the index `direction` (0 to 5) in a twist. `column`, `g` and `own` (6, 1) are
+    `column`, `gain` and `rest` of the `Pivot` that eliminates it.
     """
     k, u = direction % 3, SX(column)
     u[direction] = 0
@@ -171,20 +192,30 @@ class Pivot:
 
     @staticmethod
     def of(body: ArticulatedInertia, direction: int, drive: RotorDrive) -> Pivot:
-        """Return the pivot of one direction of a body, with the drive of the joint."""
+        """Return the pivot that eliminates one velocity of the joint of a body.
+
+        Args:
+            body: articulated inertia of the link after the joint, in the frame of the joint.
+            direction: index of the velocity in a twist [linear; angular], 0 to 5.
+            drive: inertia of the drive of the joint.
+        """
         column = body.column(direction)
         return Pivot(direction, *_pivot(column, drive.inertia, drive.momentum, direction))
 
     def transmit(self, wrench: SX, effort: SX) -> tuple[SX, SX]:
-        """Eliminate a joint from the wrench (6, 1) of a body at zero joint acceleration.
+        """Return the wrench that passes the joint, and the effort left to accelerate it.
+
+        Args:
+            wrench: (6, 1) wrench that the body needs at zero joint acceleration.
+            effort: joint effort.
 
         Returns:
-            Wrench on the antecedent, and the effort left to accelerate the joint.
+            wrench (6, 1) on the antecedent, and effort left to accelerate the joint.
         """
         return _transmitted(wrench, effort, self.gain, self.ratio, self.direction)
 
     def accelerate(self, twist: SX, left: SX) -> tuple[SX, SX]:
-        """Return the acceleration (6, 1) of the link after the joint, and of the joint.
+        """Return the acceleration (6, 1) of the link after the joint, and the joint acceleration.
 
         Args:
             twist: (6, 1) acceleration before the joint.
@@ -195,7 +226,11 @@ class Pivot:
 
 @formula((6, 1), (1, 1), (3, 1))
 def _pivot(column: SX, inertia: SX, momentum: SX, direction: int) -> tuple[SX, SX, SX, SX, SX, SX]:
-    """Compute column, rest, size, inverse, gain and ratio of a pivot."""
+    """Return column, rest, size, inverse, gain and ratio, the fields of `Pivot`.
+
+    `column` (6, 1) is the wrench of the body for a unit acceleration in the joint direction of
+    index `direction`; `inertia` and `momentum` are those of the `RotorDrive` of the joint.
+    """
     column = SX(column)
     column[3:] += momentum
     D = column[direction] + inertia
@@ -209,7 +244,11 @@ def _pivot(column: SX, inertia: SX, momentum: SX, direction: int) -> tuple[SX, S
 
 @formula((6, 1), (1, 1), (6, 1), (1, 1))
 def _transmitted(wrench: SX, effort: SX, gain: SX, ratio: SX, direction: int) -> tuple[SX, SX]:
-    """Return wrench and remaining effort of `Pivot.transmit`."""
+    """Return the wrench (6, 1) on the antecedent, and the effort left to accelerate the joint.
+
+    `wrench` (6, 1) is what the body needs at zero joint acceleration, and `effort` is the joint
+    effort. `gain`, `ratio` and `direction` are those of the `Pivot` of the joint.
+    """
     left = effort - wrench[direction]
     wrench = wrench - gain * left
     wrench[direction] = effort - ratio * left
@@ -220,7 +259,12 @@ def _transmitted(wrench: SX, effort: SX, gain: SX, ratio: SX, direction: int) ->
 def _accelerated(
     twist: SX, left: SX, gain: SX, inverse: SX, ratio: SX, direction: int
 ) -> tuple[SX, SX]:
-    """Return the acceleration after a joint and the joint acceleration of `Pivot.accelerate`."""
+    """Return the acceleration (6, 1) of the link after a joint, and the joint acceleration.
+
+    `twist` (6, 1) is the acceleration before the joint and `left` the second result of
+    `_transmitted`. `gain`, `inverse`, `ratio` and `direction` are those of the `Pivot` of the
+    joint.
+    """
     before = twist[direction]
     own = casadi.dot(gain, twist) - inverse * left + ratio * before
     twist = SX(twist)
@@ -229,7 +273,10 @@ def _accelerated(
 
 
 def _symmetric_product(a: SX, b: SX) -> SX:
-    """Return the product a b', which must be symmetric, with six multiplications."""
+    """Return the outer product a b' (3, 3) of (3, 1) vectors, which must be symmetric.
+
+    Six multiplications are needed.
+    """
     product = zeros(3, 3)
     for row in range(3):
         for column in range(row, 3):
@@ -271,6 +318,9 @@ def solve_inertia(tree: Tree, poses: list[LinkPose], right: SX) -> SX:
         tree: links, rotors included.
         poses: pose of each link relative to its antecedent.
         right: (nv, m) right-hand sides, such as joint efforts.
+
+    Returns:
+        x (nv, m), such as joint accelerations due to efforts at rest without gravity.
     """
     poses, bodies = shift_frames(tree, poses, [link.inertia for link in tree.links])
     eliminations = _eliminations(tree, poses, bodies)
@@ -287,11 +337,11 @@ def articulated_accelerations(
     base: Acceleration,
     external: Mapping[int, Wrench],
 ) -> SX:
-    """Return the joint accelerations (nv, 1) due to joint efforts: forward dynamics of the tree.
+    """Return the joint accelerations (nv, 1) due to joint efforts: forward dynamics of a tree.
 
-    The wrenches of the motion with zero joint accelerations are computed first. The efforts that
-    do not balance them accelerate the articulated bodies. Joint friction and springs of the tree
-    are not included.
+    The wrenches of the motion with zero joint accelerations are computed first. The efforts that do
+    not balance them accelerate the articulated bodies. Joint friction and springs of the tree are
+    not included.
 
     Args:
         tree: links, rotors included.
@@ -320,9 +370,15 @@ def articulated_accelerations(
 
 
 def inertia_pivots(tree: Tree, poses: list[LinkPose]) -> tuple[SX, SX]:
-    """Return two inertias (nv, 1) of each velocity: descendant joints free to move, and locked.
+    """Return two inertias (nv, 1) of each joint velocity, with free and with locked descendants.
 
-    If the first is negligible relative to the second, the inertia matrix is singular.
+    The first is the effort for a unit acceleration if the joints of descendants move freely, the
+    second if they are locked. If the first is negligible relative to the second, the inertia matrix
+    is singular.
+
+    Args:
+        tree: links, rotors included.
+        poses: pose of each link relative to its antecedent.
     """
     poses, bodies = shift_frames(tree, poses, [link.inertia for link in tree.links])
     rigid = regroup(tree, poses, bodies)
@@ -331,15 +387,17 @@ def inertia_pivots(tree: Tree, poses: list[LinkPose]) -> tuple[SX, SX]:
         free[link.v] = casadi.vertcat(*(pivot.size for pivot in elimination.pivots))
     for j in reversed(range(len(tree.links))):
         link, body = tree.links[j], rigid[j]
-        whole, drive = ArticulatedInertia.of(body), _drive(tree, poses, j)
-        for number, direction in zip(_numbers(link), _DIRECTIONS[link.motion], strict=True):
+        whole, drive = ArticulatedInertia.of(body), _rotor_drive(tree, poses, j)
+        for number, direction in zip(
+            _velocity_indices(link), _DIRECTIONS[link.motion], strict=True
+        ):
             locked[number] = Pivot.of(whole, direction, drive).size
         if link.antecedent >= 0:
             rigid[link.antecedent] += transform_inertia_along(poses[j].steps, body)
     return free, locked
 
 
-def _numbers(link: Link) -> range:
+def _velocity_indices(link: Link) -> range:
     """Return the indices in v of the velocities of the joint of a link."""
     return range(link.v.start, link.v.stop)
 
@@ -347,7 +405,10 @@ def _numbers(link: Link) -> range:
 def _eliminations(
     tree: Tree, poses: list[LinkPose], bodies: Sequence[Inertia]
 ) -> list[JointElimination]:
-    """Return the elimination of each joint, by link; computed from the leaves to the base."""
+    """Return the elimination of the velocities of each joint, by link.
+
+    `bodies` are the inertias of the links. Eliminations are computed from the leaves to the base.
+    """
     rigid = regroup(tree, poses, list(bodies))
     articulated = [ArticulatedInertia.of(body) for body in rigid]
     leaves = set(range(len(tree.links))) - {link.antecedent for link in tree.links}
@@ -362,7 +423,7 @@ def _eliminations(
         elif j in leaves and link.motion.nv == 1:
             inner, outer = pose.motion, pose.seat
             body = ArticulatedInertia.of(pose.motion[0].body(rigid[j]))
-        drive, pivots = _drive(tree, poses, j), list[Pivot]()
+        drive, pivots = _rotor_drive(tree, poses, j), list[Pivot]()
         if inner:
             drive = replace(drive, momentum=inner[0].rotation.apply(drive.momentum))
         for direction in _DIRECTIONS[link.motion]:
@@ -374,8 +435,8 @@ def _eliminations(
     return result[::-1]
 
 
-def _drive(tree: Tree, poses: list[LinkPose], j: int) -> RotorDrive:
-    """Return the drive inertia of joint j, in the frame of its link."""
+def _rotor_drive(tree: Tree, poses: list[LinkPose], j: int) -> RotorDrive:
+    """Return the inertia of the motor and rotor of joint j, in the frame of link j."""
     link = tree.links[j]
     if link.rotor is None:
         return RotorDrive(link.Ia, zeros())
@@ -401,14 +462,16 @@ def _solution(
     for j in reversed(range(len(tree.links))):
         link, joint = tree.links[j], joints[j]
         wrench = _moved_wrench(joint.inner, needed[j])
-        for number, pivot in zip(_numbers(link), joint.pivots, strict=True):
+        for number, pivot in zip(_velocity_indices(link), joint.pivots, strict=True):
             wrench, left[number] = pivot.transmit(wrench, joint.sign * efforts[number])
         if link.antecedent >= 0:
             needed[link.antecedent] += _moved_wrench(joint.outer, wrench)
     x, twists = zeros(tree.nv), [zeros(6)] * (len(tree.links) + 1)
     for j, link in enumerate(tree.links):
         twist = _moved_twist(joints[j].outer, twists[link.antecedent])
-        for number, pivot in reversed(list(zip(_numbers(link), joints[j].pivots, strict=True))):
+        for number, pivot in reversed(
+            list(zip(_velocity_indices(link), joints[j].pivots, strict=True))
+        ):
             twist, own = pivot.accelerate(twist, left[number])
             x[number] = joints[j].sign * own
         twists[j] = _moved_twist(joints[j].inner, twist)
@@ -416,12 +479,18 @@ def _solution(
 
 
 def _moved_wrench(steps: Sequence[Displacement], wrench: SX) -> SX:
-    """Transform a wrench (6, 1) from the frame after displacements to the frame before them."""
+    """Transform a wrench (6, 1) from the frame after displacements to the frame before them.
+
+    `steps` are the displacements, in order.
+    """
     return casadi.vertcat(*transform_wrench_along(steps, wrench[:3], wrench[3:]))
 
 
 def _moved_twist(steps: Sequence[Displacement], twist: SX) -> SX:
-    """Transform a twist (6, 1) from the frame before displacements to the frame after them."""
+    """Transform a twist (6, 1) from the frame before displacements to the frame after them.
+
+    `steps` are the displacements, in order.
+    """
     v, w = twist[:3], twist[3:]
     for step in steps:
         p = step.point(zeros())

@@ -76,10 +76,11 @@ class ChainJoint:
         return self.motion is not Motion.PRISMATIC
 
     def displacement(self, q: SX) -> Pose:
-        """Return the pose of the frame after the joint in the frame before it, at position q.
+        """Return the pose of the frame after the joint relative to the frame before it.
 
-        A position is an angle [rad], a distance [m], a quaternion, or (free) three translations
-        [m] and a quaternion.
+        Args:
+            q: position of the joint: an angle [rad], a distance [m], a quaternion (4, 1), or for a
+                free joint three translations [m] and a quaternion (7, 1).
         """
         match self.motion:
             case Motion.FREE:
@@ -92,7 +93,12 @@ class ChainJoint:
 
 
 def free_pose(values: SX, sign: int = 1) -> Pose:
-    """Return the pose of three translations [m] and a quaternion; its inverse if sign is -1."""
+    """Return the pose of a free joint, or its inverse.
+
+    Args:
+        values: (7, 1) three translations [m], and a quaternion w, x, y, z of any norm.
+        sign: 1 for the pose, -1 for its inverse.
+    """
     pose = Pose.translation(values[0:3]) @ _spherical_pose(values[3:7], 1)
     return pose if sign > 0 else pose.inverse()
 
@@ -108,7 +114,7 @@ def _spherical_pose(quaternion: SX, sign: int) -> Pose:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gap:
-    """Known transform from one joint of a chain to the next.
+    """Known transform from one joint of a chain to the next joint.
 
     Attributes:
         pose: pose of the frame before the next joint in the frame after the previous joint.
@@ -122,19 +128,19 @@ class Gap:
     back: Pose | None = None
 
     def then(self, pose: Pose) -> Gap:
-        """Return the transform followed by `pose`."""
+        """Return the transform followed by the pose `pose`."""
         back = None if self.back is None else pose.inverse() @ self.back
         return Gap(self.pose @ pose, self.pivots, back)
 
     def after(self, gap: Gap) -> Gap:
-        """Return the transform `gap`, followed by the present transform."""
+        """Return the transform `gap` followed by this transform."""
         seen = (gap.pose @ pivot for pivot in self.pivots)
         known = self.back is not None or gap.back is not None
         back = self.inverse().pose @ gap.inverse().pose if known else None
         return Gap(gap.pose @ self.pose, (*gap.pivots, *seen), back)
 
     def inverse(self) -> Gap:
-        """Return the transform from the end to the beginning."""
+        """Return the transform from its end to its beginning."""
         back = self.back or self.pose.inverse()
         return Gap(back, tuple(back @ pivot for pivot in self.pivots), self.pose)
 
@@ -156,18 +162,22 @@ class Chain:
 
     @property
     def between(self) -> Sequence[Pose]:
-        """Poses of the transforms `gaps`."""
+        """Poses of the n + 1 transforms `gaps` (n in a `Ring`)."""
         return [gap.pose for gap in self.gaps]
 
     def displacements(self, q: SX) -> Sequence[Pose]:
-        """Return the displacements of the joints at positions q (n, 1) [rad or m].
+        """Return the displacements of the joints, all of which must be revolute or prismatic.
 
-        All joints must be revolute or prismatic.
+        Args:
+            q: (n, 1) positions of the joints, in the order of the chain [rad or m].
         """
         return [joint.displacement(SX(q[k])) for k, joint in enumerate(self.joints)]
 
     def ring(self) -> Ring:
-        """Return the closed chain if both ends coincide; the last gap is merged into the first."""
+        """Return the loop whose two end frames coincide.
+
+        The last transform is merged into the first.
+        """
         if not self.joints:
             return Ring((), ())
         return Ring(self.joints, (self.gaps[0].after(self.gaps[-1]), *self.gaps[1:-1]))
@@ -175,7 +185,7 @@ class Chain:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ring(Chain):
-    """Closed chain, whose two end frames coincide; gaps[k] comes before joints[k]."""
+    """Loop: closed chain, whose two end frames coincide; gaps[k] comes before joints[k]."""
 
     def rotated(self, first: int) -> Ring:
         """Return the same loop, which starts with the joint of index `first`."""
@@ -190,7 +200,7 @@ class Ring(Chain):
         return Ring(joints, gaps)
 
     def without(self, k: int) -> Ring:
-        """Return the loop with joint k locked at position zero."""
+        """Return the loop with joint k locked at position zero, as part of the transforms."""
         n = len(self.joints)
         merged = self.gaps[(k + 1) % n].after(self.gaps[k])
         gaps = [merged if m == (k + 1) % n else gap for m, gap in enumerate(self.gaps) if m != k]
@@ -211,19 +221,19 @@ class JointChain(Protocol[T_co, Q_contra]):
         """Known transforms before, between and (except in a ring) after the joints."""
 
     def displacements(self, q: Q_contra) -> Sequence[T_co]:
-        """Transforms of the joints at positions q."""
+        """Return the transforms of the joints at positions q [rad or m]."""
 
 
 def transforms(chain: JointChain[T, Q], q: Q) -> list[T]:
-    """Compute the poses of the frames before every joint and at the end of a chain.
+    """Return the poses of the frames before every joint and at the end of a chain.
 
     Args:
         chain: chain of n joints.
         q: positions [rad or m]: symbolic (n, 1), or numeric (..., n).
 
     Returns:
-        n + 1 transforms relative to the beginning of the chain. The first transform does not
-        depend on q, so that it is a single (4, 4) matrix even for many configurations.
+        n + 1 transforms relative to the beginning of the chain. The first transform does not depend
+        on q, so that it is a single (4, 4) matrix even for many configurations.
     """
     between = chain.between
     here = between[0]
@@ -237,11 +247,11 @@ def transforms(chain: JointChain[T, Q], q: Q) -> list[T]:
 
 
 def frames_at_zero(gaps: Sequence[Gap], start: Pose | None = None) -> list[Pose]:
-    """Compute the poses of the ends of all gaps, with the joints between them at zero.
+    """Return the poses of the ends of all transforms, with the joints between them at zero.
 
     Args:
         gaps: transforms, in the order of the chain.
-        start: pose of the beginning of the first gap. Default is the identity.
+        start: pose of the beginning of the first transform. Default is the identity.
     """
     begin = Pose.identity() if start is None else start
     return list(accumulate((gap.pose for gap in gaps), matmul, initial=begin))[1:]
@@ -269,7 +279,7 @@ class ChainBuilder:
     gap: Gap = field(default_factory=Gap)
 
     def over(self, pose: Pose) -> None:
-        """Append a known transform to the chain."""
+        """Append a known transform, a pose, to the chain."""
         self.gap = self.gap.then(pose)
 
     def through(self, joint: ChainJoint) -> None:
@@ -289,7 +299,9 @@ class ChainBuilder:
         self.over(joint.displacement(self.q[index : index + joint.motion.nq]))
 
     def along_tree(self, tree: Tree, a: Frame, b: Frame, spins: Mapping[int, Spin]) -> None:
-        """Append the path from frame a to the common link and from there to frame b.
+        """Append the path in a tree from frame a to frame b.
+
+        The path goes towards the base up to the common link of both frames.
 
         Args:
             tree: the links.
@@ -314,14 +326,28 @@ class ChainBuilder:
 
 
 def _joint(tree: Tree, k: int, sign: int, spins: Mapping[int, Spin]) -> ChainJoint:
-    """Return the chain joint of tree link k; sign is -1 if the chain passes it towards the base."""
+    """Return the chain joint of link k of a tree.
+
+    `sign` is -1 if the chain passes it towards the base, else 1; `spins` as in
+    `ChainBuilder.along_tree`.
+    """
     link = tree.links[k]
     sign = -sign if link.backward else sign
     return ChainJoint(link.name, link.motion, link.q.start, sign, spin=spins.get(link.q.start))
 
 
 def links_between(tree: Tree, a: int, b: int) -> tuple[list[int], list[int]]:
-    """Return the links from link a back to the last common ancestor, and from there to b."""
+    """Return the links on the path from link a to link b of a tree, in two parts.
+
+    Args:
+        tree: the links.
+        a: index of the first link, -1 for the base.
+        b: index of the last link, -1 for the base.
+
+    Returns:
+        links from a towards the base, without the last common link of both; and links from there to
+        b.
+    """
     fork = common_link(tree, a, b)
     back, out = ([k for k in tree.path(link) if k not in tree.path(fork)] for link in (a, b))
     return back[::-1], out

@@ -11,7 +11,6 @@ import casadi
 from casadi import SX
 
 from mbs.assembly.tree import Tree
-from mbs.components.joints import Motion
 from mbs.recursions.link_motions import LinkPose, effort, unit_motions
 from mbs.recursions.newton_euler import momentum_on
 from mbs.recursions.regrouping import regroup, shift_frames
@@ -19,10 +18,15 @@ from mbs.spatial import Wrench, transform_inertia_along, transform_wrench_along,
 
 
 def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
-    """Return the symmetric inertia matrix A(q) (nv, nv), rotors included [kg m^2, kg m, kg].
+    """Return the symmetric inertia matrix A(q) (nv, nv) of a tree, rotors included.
 
-    For a joint j with one velocity, the composite body of link j is expressed in the joint frame
-    on the antecedent i, in which the momentum for a unit velocity needs no products.
+    Elements are in kg m^2, kg m or kg. For a joint j with one velocity, the composite body of link
+    j (link j with its descendants) is expressed in the joint frame on the antecedent i, in which
+    the momentum for a unit velocity needs no products.
+
+    Args:
+        tree: links, rotors included.
+        poses: pose of each link relative to its antecedent.
     """
     poses, bodies = shift_frames(tree, poses, [link.inertia for link in tree.links])
     composite = regroup(tree, poses, bodies)
@@ -36,7 +40,9 @@ def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
             steps = pose.steps
         for column, (linear, angular) in enumerate(unit_motions(link, pose)):
             f, m = body.momentum(linear, angular)
-            spin = _at_seat(pose, link.motion, momentum_on(link, j))
+            spin = momentum_on(link, j)
+            if link.motion.nv == 1:
+                spin = pose.motion[0].rotation.apply(spin)
             m = m + spin
             A[link.v, link.v.start + column] = effort(link, pose, f, m)
             f_i, m_i = transform_wrench_along(steps, f, m)
@@ -51,15 +57,13 @@ def inertia_matrix(tree: Tree, poses: list[LinkPose]) -> SX:
     return A
 
 
-def _at_seat(pose: LinkPose, motion: Motion, vector: SX) -> SX:
-    """Express a vector of the link in the frame in which its joint momentum is computed."""
-    return pose.motion[0].rotation.apply(vector) if motion.nv == 1 else vector
-
-
 def _fill_ancestors(
     A: SX, tree: Tree, poses: list[LinkPose], j: int, column: int, wrench: Wrench
 ) -> None:
-    """Write the efforts of a wrench on the antecedent of link j into its column and row of A."""
+    """Write elements of the inertia matrix A, in place: efforts of the ancestors of link j.
+
+    `wrench` is the momentum on the antecedent of link j for a unit value of its velocity `column`.
+    """
     k = tree.links[j].v.start + column
     i = tree.links[j].antecedent
     while i >= 0:
@@ -80,7 +84,13 @@ def _fill_ancestors(
 
 
 def velocity_antecedents(tree: Tree) -> list[int]:
-    """Return for each velocity the index of the previous velocity towards the base, or -1."""
+    """Return for each joint velocity the index of the nearest velocity towards the base, or -1.
+
+    Velocities of one joint follow each other in this order.
+
+    Args:
+        tree: the links.
+    """
     before = []
     for link in tree.links:
         i = link.antecedent
@@ -103,13 +113,17 @@ class TreeFactor(NamedTuple):
 
 
 def factor_symbols(before: list[int]) -> TreeFactor:
-    """Return factors made of symbols, for the ancestors `before` of `factorize`."""
+    """Return the factors of an inertia matrix as symbols.
+
+    Args:
+        before: index of the nearest ancestor of each row, or -1, see `factorize`.
+    """
     size = sum(len(_path(before, k)) for k in range(len(before)))
     return TreeFactor(SX.sym("ratios", size), SX.sym("inverse", len(before)))
 
 
 def factorize(A: SX, before: list[int]) -> TreeFactor:
-    """Factorize A = L' D L.
+    """Return the factors of A = L' D L.
 
     Args:
         A: (n, n) symmetric matrix; A[i, j] is zero unless i = j, i is an ancestor of j, or j of i.
@@ -152,12 +166,18 @@ def substitute(factor: TreeFactor, right: SX, before: list[int]) -> SX:
 
 
 def solve_tree(A: SX, right: SX, before: list[int]) -> SX:
-    """Solve A x = right for x; see `factorize` and `substitute` for the arguments."""
+    """Return the solution x (n, m) of A x = right for the inertia matrix of a tree.
+
+    Args:
+        A: (n, n) symmetric matrix, see `factorize`.
+        right: (n, m) right-hand sides.
+        before: index of the nearest ancestor of each row, or -1.
+    """
     return substitute(factorize(A, before), right, before)
 
 
 def _path(before: list[int], k: int) -> list[int]:
-    """Return the ancestors of a velocity, the nearest first."""
+    """Return the ancestors of the velocity k, the nearest first; `before` as in `factorize`."""
     path = []
     while before[k] >= 0:
         k = before[k]

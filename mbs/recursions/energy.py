@@ -13,7 +13,13 @@ from mbs.spatial import cross
 
 
 def kinetic_energy(tree: Tree, poses: list[LinkPose], v: SX) -> SX:
-    """Return the kinetic energy [J] of links and rotors."""
+    """Return the kinetic energy [J] of links and rotors.
+
+    Args:
+        tree: links, rotors included.
+        poses: pose of each link relative to its antecedent.
+        v: (nv, 1) joint velocities.
+    """
     motions = link_velocities(tree, poses, v)
     total = rotor_energy(tree, v, [motion.w for motion in motions])
     for link, motion in zip(tree.links, motions, strict=True):
@@ -28,7 +34,12 @@ def kinetic_energy(tree: Tree, poses: list[LinkPose], v: SX) -> SX:
 
 
 def potential_energy(tree: Tree, poses: list[LinkPose]) -> SX:
-    """Return the potential energy [J] of gravity, relative to all mass at the base origin."""
+    """Return the potential energy [J] of gravity. It is zero with all mass at the base origin.
+
+    Args:
+        tree: links; gravity is given in the base frame.
+        poses: pose of each link relative to its antecedent.
+    """
     total = SX(0)
     for link, pose in zip(tree.links, base_poses(tree, poses), strict=True):
         moment = link.inertia.m * pose.p + casadi.mtimes(pose.R, link.inertia.ms)

@@ -32,9 +32,9 @@ from mbs.spatial import PseudoInertia, Wrench, add_wrenches, transform_wrench, z
 def inertial_loads(
     tree: Tree, poses: list[LinkPose], v: SX, a: SX, base: Acceleration
 ) -> dict[int, Wrench]:
-    """Return the inertial wrench of each link and of its rotors, by link index.
+    """Return the wrench that accelerates each link and its rotors, by link index.
 
-    Each wrench (force [N], moment [N m]) acts at the origin of the link frame, in its axes.
+    Each wrench (force [N], moment [N m]) is about the origin of the link frame, in its axes.
 
     Args:
         tree: the links.
@@ -55,7 +55,9 @@ def inertial_loads(
 def transmitted_wrenches(
     tree: Tree, poses: list[LinkPose], loads: Mapping[int, Wrench]
 ) -> list[Wrench]:
-    """Return the wrench that each link receives from its antecedent, in the frame of the link.
+    """Return the wrench that each joint transmits from the antecedent to its link.
+
+    Wrenches (force [N], moment [N m]) are about the origin and in axes of the frame of the link.
 
     Args:
         tree: the links.
@@ -72,7 +74,11 @@ def transmitted_wrenches(
 
 
 def sum_wrenches(*parts: Mapping[int, Wrench]) -> dict[int, Wrench]:
-    """Add wrenches on links, link by link."""
+    """Return the sum of wrenches on each link, by link index.
+
+    Args:
+        parts: wrenches about the origin and in axes of the link frames, by link index.
+    """
     total: dict[int, Wrench] = {}
     for part in parts:
         for link, wrench in part.items():
@@ -83,12 +89,14 @@ def sum_wrenches(*parts: Mapping[int, Wrench]) -> dict[int, Wrench]:
 def element_wrenches(
     acting: PartsAt, held: Container[tuple[str, str]] | None = None
 ) -> dict[int, Wrench]:
-    """Return the wrench that a link exerts on components, by link index, in the link frame.
+    """Return the wrench that each link exerts on components at its points, by link index.
+
+    Wrenches (force [N], moment [N m]) are about the origin and in axes of the link frame.
 
     Args:
         acting: components at given positions and velocities.
-        held: points (component name, port) whose wrenches are summed, including points on the
-            base (link -1). By default all points on moving links.
+        held: points (component name, port) whose wrenches are summed, including points on the base
+            (link -1). By default all points on moving links.
     """
     exerted: list[dict[int, Wrench]] = []
     for part in acting.parts:
@@ -104,14 +112,25 @@ def element_wrenches(
 def element_efforts(acting: PartsAt, poses: list[LinkPose]) -> SX:
     """Return the joint efforts (nv, 1) that balance all components [N m or N].
 
-    It is the contribution of the components to the efforts of the inverse dynamic model.
+    They are added to the efforts of the inverse dynamic model.
+
+    Args:
+        acting: components at given positions and velocities.
+        poses: pose of each link relative to its antecedent.
     """
     wrenches = element_wrenches(acting)
     return wrench_efforts(acting.tree, poses, wrenches) + acting.efforts()
 
 
 def wrench_efforts(tree: Tree, poses: list[LinkPose], wrenches: Mapping[int, Wrench]) -> SX:
-    """Return the joint efforts (nv, 1) that transmit wrenches of links to the base."""
+    """Return the joint efforts (nv, 1) [N m or N] with which the joints supply wrenches of links.
+
+    Args:
+        tree: the links.
+        poses: pose of each link relative to its antecedent.
+        wrenches: wrench that a link requires, by link index, about the origin and in axes of its
+            frame.
+    """
     carried = transmitted_wrenches(tree, poses, wrenches)
     at = zip(tree.links, poses, carried, strict=True)
     return casadi.vertcat(*(effort(link, pose, *wrench) for link, pose, wrench in at))

@@ -60,7 +60,7 @@ class VelocityTarget:
     axes: Frame
 
     def along(self, axes: Frame) -> VelocityTarget:
-        """Return the same target with the velocity expressed in other axes."""
+        """Return the same target with the velocity expressed in the axes of another frame."""
         return replace(self, axes=axes)
 
 
@@ -85,7 +85,7 @@ class JacobianFrame:
 
 
 def outlook(target: VelocityTarget) -> JacobianFrame:
-    """Return the two paths from which the Jacobian of a target is computed."""
+    """Return the paths from the axes of a target to the moving frame and to the base."""
     tree, q, frame, axes = target.tree, target.q, target.frame, target.axes
     back, out = path_between(tree, q, axes, frame)
     aside = [step for step in back if not isinstance(step, (JointAt, OriginOf))]
@@ -96,19 +96,21 @@ def outlook(target: VelocityTarget) -> JacobianFrame:
 
 
 def jacobian(seen: JacobianFrame, reference: int | None = None, matrices: int = 0) -> SX:
-    """Return the Jacobian J (6, nv) of a moving frame, with [V; w] = J v, in the axes of `seen`.
+    """Return the Jacobian J (6, nv) of a moving frame, in the axes at the start of two paths.
+
+    [V; w] = J v with the linear velocity V [m/s] and the angular velocity w [rad/s].
 
     Args:
         seen: paths from the axes to the moving frame and to the base.
         reference: link (-1 for the base) whose frame origin is the reference point: V is the
-            velocity of the point of the moving frame that coincides with it. None for the origin
-            of the moving frame.
+            velocity of the point of the moving frame that coincides with it. None for the origin of
+            the moving frame.
         matrices: number of rotations, counted from the axes, that are multiplied to orientation
             matrices. Beyond them each vector is rotated step by step. The result is the same; only
             the number of operations changes.
     """
     J = zeros(6, seen.tree.nv)
-    for branch, arms in zip(seen.branches, _arms(seen.branches, reference), strict=True):
+    for branch, arms in zip(seen.branches, _reference_arms(seen.branches, reference), strict=True):
         columns = _local_columns(seen.tree, branch, arms)
         for k, V, w in _columns_at_start(branch, columns, matrices):
             J[:, k] = casadi.vertcat(V, w)
@@ -119,8 +121,8 @@ Column = tuple[int, SX, SX]
 """Index in v, and the linear and angular velocity (3, 1) of a unit velocity."""
 
 
-def _arms(branches: Sequence[list[PathStep]], reference: int | None) -> list[list[SX]]:
-    """Return vectors (3, 1) to the reference point from the end of each step of each path.
+def _reference_arms(branches: Sequence[list[PathStep]], reference: int | None) -> list[list[SX]]:
+    """Return vectors (3, 1) [m] from the end of each step of each path to the reference point.
 
     They are in the local axes of the step.
 
@@ -128,21 +130,22 @@ def _arms(branches: Sequence[list[PathStep]], reference: int | None) -> list[lis
         branches: paths to the moving frame and to the base.
         reference: link whose origin is the reference point; None for the moving frame.
     """
-    place = [_place(branch, reference) for branch in branches]
+    place = [_reference_step(branch, reference) for branch in branches]
     here = 0 if reference is None or place[0] is not None else 1
     number = place[here]
     assert number is not None
-    inward, arm = _inward(branches[here][: number + 1])
-    outward = _outward(branches[here][number + 1 :], zeros())
-    other = _outward(branches[1 - here], arm)
+    inward, arm = _vectors_to_end(branches[here][: number + 1])
+    outward = _vectors_to_point(branches[here][number + 1 :], zeros())
+    other = _vectors_to_point(branches[1 - here], arm)
     own = inward + outward
     return [own, other] if here == 0 else [other, own]
 
 
-def _place(branch: list[PathStep], reference: int | None) -> int | None:
-    """Return the index of the step at the origin of link `reference`; None if not on the path.
+def _reference_step(branch: list[PathStep], reference: int | None) -> int | None:
+    """Return the index of the step of a path at the origin of link `reference`.
 
-    Without a reference it is the last step, -1 for an empty path.
+    None if the path does not contain it. Without a reference it is the last step, -1 for an empty
+    path.
     """
     if reference is None:
         return len(branch) - 1
@@ -150,8 +153,11 @@ def _place(branch: list[PathStep], reference: int | None) -> int | None:
     return branch.index(mark) if mark in branch else None
 
 
-def _inward(branch: list[PathStep]) -> tuple[list[SX], SX]:
-    """Return vectors (3, 1) to the end of the path: from after each step, and from its start."""
+def _vectors_to_end(branch: list[PathStep]) -> tuple[list[SX], SX]:
+    """Return vectors (3, 1) [m] to the end of a path: after each step, and from its start.
+
+    Each is in the axes at its own beginning.
+    """
     arm, arms = zeros(), []
     for step in reversed(branch):
         arms.append(arm)
@@ -163,8 +169,11 @@ def _inward(branch: list[PathStep]) -> tuple[list[SX], SX]:
     return arms[::-1], arm
 
 
-def _outward(branch: list[PathStep], arm: SX) -> list[SX]:
-    """Return vectors (3, 1) to a point from after each step; `arm` is that vector at the start."""
+def _vectors_to_point(branch: list[PathStep], arm: SX) -> list[SX]:
+    """Return vectors (3, 1) [m] to a point from after each step of a path, in axes of the step.
+
+    `arm` is the vector to this point from the start of the path.
+    """
     arms = []
     for step in branch:
         match step:
@@ -177,7 +186,10 @@ def _outward(branch: list[PathStep], arm: SX) -> list[SX]:
 
 
 def _local_columns(tree: Tree, branch: list[PathStep], arms: list[SX]) -> list[tuple[int, Column]]:
-    """Pairs of step index and Jacobian column, in the local axes, of the joints on a branch."""
+    """Return pairs (step index, Jacobian column) of the joints on a path, in axes of the step.
+
+    `arms` are the vectors (3, 1) to the reference point, by step.
+    """
     result = []
     for number, step in enumerate(branch):
         if isinstance(step, JointAt):
@@ -266,7 +278,11 @@ class JacobianSamples:
     units: Array
 
     def combine(self, G: Array) -> JacobianSamples:
-        """Return the same data for m other velocities u, with v = G u and G (samples, nv, m)."""
+        """Return the same data for m other velocities u, with v = G u.
+
+        Args:
+            G: (samples, nv, m) matrix at each configuration.
+        """
         parts = G / self.units[:, None]
         sizes = np.abs(parts).max(axis=(0, 1))
         units = 1 / np.where(sizes > 0, sizes, 1.0)
@@ -274,28 +290,31 @@ class JacobianSamples:
 
     @property
     def on_path(self) -> range:
-        """Indices in `frames` of the base and of the links."""
+        """Indices in `frames` of the base and the links on the path, without the required axes."""
         return range(len(self.frames) - 1)
 
     def linear(self, axes: int, reference: int | None) -> Array:
-        """(samples, 3, nv) velocity of frames[reference] in the axes of frames[axes].
+        """Return the scaled velocities (samples, 3, nv) of a point of the moving frame.
 
-        None as reference is the origin of the moving frame.
+        Args:
+            axes: index in `frames` of the axes in which they are expressed.
+            reference: index in `frames` of the frame whose origin is the point; None for the origin
+                of the moving frame.
         """
         place = self.target_p if reference is None else self.p[reference]
         V = self.J[:, :3] + np.cross(self.J[:, 3:], (place - self.target_p)[..., None], axis=1)
         return np.asarray(np.swapaxes(self.R[axes], 1, 2) @ V)
 
     def angular(self, axes: int) -> Array:
-        """(samples, 3, nv) angular velocity in the axes of frames[axes]."""
+        """Return the angular velocities (samples, 3, nv) in the axes of frames[axes]."""
         return np.asarray(np.swapaxes(self.R[axes], 1, 2) @ self.J[:, 3:])
 
     def orientation(self, axes: int) -> Array:
-        """(samples, 3, 3) orientation of frames[axes] in the required axes."""
+        """Return the orientation (samples, 3, 3) of frames[axes] relative to the required axes."""
         return np.asarray(np.swapaxes(self.R[-1], 1, 2) @ self.R[axes])
 
     def separate_origins(self) -> list[int]:
-        """Indices of frames on the path with distinct origins; of equal origins, the last frame.
+        """Return the indices of frames on the path with distinct origins; of equal ones the last.
 
         Frames with the origin of the moving frame are left out.
         """
@@ -307,9 +326,9 @@ class JacobianSamples:
         return kept[::-1]
 
     def arm(self, reference: int | None) -> Array:
-        """Return scaled vectors (samples, 3) from frames[reference] to the moving frame.
+        """Return the scaled vectors (samples, 3) from frames[reference] to the moving frame.
 
-        They are in the required axes. Zero if the reference is None.
+        They are in the required axes. They are zero if `reference` is None.
         """
         if reference is None:
             return np.zeros_like(self.target_p)
@@ -318,7 +337,7 @@ class JacobianSamples:
 
 
 def survey(target: VelocityTarget) -> JacobianSamples:
-    """Evaluate the Jacobian of a moving frame, and frames on its path, at random configurations."""
+    """Evaluate the Jacobian of a target, and the frames on its path, at random configurations."""
     tree, q, frame, axes = target.tree, target.q, target.frame, target.axes
     path = tree.path(frame[0])
     poses = base_poses(tree, link_poses(tree, q))
@@ -344,7 +363,12 @@ def survey(target: VelocityTarget) -> JacobianSamples:
 
 
 def random_samples(tree: Tree, parameters: int) -> list[tuple[Array, Array]]:
-    """Return random positions, each with the same random parameters."""
+    """Return three pairs (q, p) of random positions (nq,) and the same random parameters.
+
+    Args:
+        tree: the links.
+        parameters: number of parameters.
+    """
     rng = np.random.default_rng(4)
     # positive values near 1 (SI units), as lengths and masses; values near zero are not generic
     p = rng.uniform(0.3, 1.7, parameters)
@@ -352,7 +376,7 @@ def random_samples(tree: Tree, parameters: int) -> list[tuple[Array, Array]]:
 
 
 def _random_position(tree: Tree, rng: np.random.Generator) -> Array:
-    """Return random positions (nq,) in [0.3, 2.8] rad or m, with unit quaternions."""
+    """Return random positions (nq,) from 0.3 to 2.8 rad or m, with unit quaternions."""
     # [rad or m], between zero and pi, because angles of zero and pi are not generic
     q = rng.uniform(0.3, 2.8, tree.nq)
     for link in tree.links:
@@ -363,14 +387,20 @@ def _random_position(tree: Tree, rng: np.random.Generator) -> Array:
 
 
 def nonzero(values: Array) -> NDArray[np.bool_]:
-    """Mask (...) of the entries of values (samples, ...) that are non-zero in some sample."""
+    """Return a mask (...) of the entries that are non-zero in some sample.
+
+    `values` is (samples, ...), with scaled lengths.
+    """
     return np.asarray(
         (np.abs(values) > _ZERO * max(1.0, float(np.abs(values).max(initial=0)))).any(0)
     )
 
 
 def varying(values: Array) -> NDArray[np.bool_]:
-    """Mask (...) of the entries of values (samples, ...) that vary with the configuration."""
+    """Return a mask (...) of the entries that differ between samples.
+
+    `values` is (samples, ...).
+    """
     return nonzero(values - values[0])
 
 
@@ -413,13 +443,13 @@ class JacobianFactors:
 
     @property
     def rotation(self) -> SX:
-        """First factor (6, 6): rotation to the target axes."""
+        """First factor (6, 6): rotation of V and w from the intermediate to the target axes."""
         Z = SX.zeros(3, 3)
         return casadi.vertcat(casadi.horzcat(self.R, Z), casadi.horzcat(Z, self.R))
 
     @property
     def displacement(self) -> SX:
-        """Second factor (6, 6): shift from the reference to the moving frame."""
+        """Second factor (6, 6): shift of the velocity from the reference to the moving frame."""
         eye = casadi.densify(SX(DM.eye(3)))
         return casadi.vertcat(
             casadi.horzcat(eye, -skew(self.L)), casadi.horzcat(SX.zeros(3, 3), eye)
@@ -427,7 +457,7 @@ class JacobianFactors:
 
 
 def cheapest_jacobian(target: VelocityTarget, reference: int | None = None) -> SX:
-    """Return the Jacobian (6, nv) in the form with the fewest operations of several candidates.
+    """Return the Jacobian (6, nv) of a target, in the cheapest of several equal forms.
 
     Args:
         target: moving frame, and the axes of the Jacobian.
@@ -444,16 +474,18 @@ def cheapest_jacobian(target: VelocityTarget, reference: int | None = None) -> S
 def renaud(
     target: VelocityTarget, intermediate: int | None = None, reference: int | None = None
 ) -> JacobianFactors:
-    """Return Renaud's three factors of a Jacobian; None selects the fewest operations of J.
+    """Return Renaud's three factors of the Jacobian of a target.
+
+    If the intermediate frame or the reference is not given, the choice needs the fewest operations.
 
     Args:
         target: moving frame, and the target axes.
         intermediate: link on the path to the frame, -1 for the base, or None to select a link.
-        reference: link on the path whose origin is the reference point of J, or None to select
-            a link.
+        reference: link on the path whose origin is the reference point of J, or None to select a
+            link.
     """
     found = survey(target)
-    ranked = _rank(found, intermediate, reference)
+    ranked = _ranked_choices(found, intermediate, reference)
     counted = _COUNTED if len(found.frames) <= _MOST_PLACES else 1
     candidates = [
         (i, r, cheapest_jacobian(target.along((i, _HOME)), r)) for i, r in ranked[:counted]
@@ -475,10 +507,14 @@ def arm_from(target: VelocityTarget, reference: int | None) -> SX:
     return express(target.tree, target.q, target.axes, place, [p])[0]
 
 
-def _rank(
+def _ranked_choices(
     found: JacobianSamples, intermediate: int | None, reference: int | None
 ) -> list[tuple[int, int | None]]:
-    """Sort pairs (axes, reference link) by the number of varying, then nonzero entries of J."""
+    """Return pairs (axes, reference link) in the order of the expected cost of the Jacobian.
+
+    The key is the number of varying, then of nonzero entries of J. `intermediate` and `reference`
+    are links that are fixed, or None.
+    """
     links = [found.frames[k][0] for k in found.on_path]
     places = spread(found.on_path)
     axes = places if intermediate is None else [links.index(intermediate)]
@@ -494,6 +530,10 @@ def _rank(
 
 
 def spread(places: Sequence[int]) -> list[int]:
-    """Select at most `_MOST_PLACES` evenly spaced elements."""
+    """Return at most 16 evenly spaced elements of a sequence.
+
+    Args:
+        places: sequence; it is returned as a list if it has at most 16 elements.
+    """
     picks = np.linspace(0, len(places) - 1, min(len(places), _MOST_PLACES)).round().astype(int)
     return [places[k] for k in picks]

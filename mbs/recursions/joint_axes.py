@@ -29,7 +29,7 @@ from mbs.spatial import Displacement, Rotation, ScrewDisplacement, cross, is_zer
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Twist:
-    """Motion vector about a point: linear and angular part, (3, 1) each."""
+    """Spatial velocity about a point, or a derivative of it: linear and angular part (3, 1)."""
 
     linear: SX
     angular: SX
@@ -39,17 +39,31 @@ class Twist:
         return Twist(self.linear + other.linear, self.angular + other.angular)
 
     def displaced(self, R: SX, p: SX) -> Twist:
-        """Transform to a frame in which the current axes have origin p and orientation R."""
+        """Transform to the origin and axes of a frame i.
+
+        Args:
+            R: (3, 3) orientation of the current axes relative to i.
+            p: (3, 1) current origin in i [m].
+        """
         angular = casadi.mtimes(R, self.angular)
         return Twist(casadi.mtimes(R, self.linear) + cross(p, angular), angular)
 
     def rate_on(self, carrier: Twist) -> Twist:
-        """Return the rate of the motion if it is fixed on a body with the velocity `carrier`."""
+        """Return the rate of this motion if it is fixed on a body that moves.
+
+        Args:
+            carrier: velocity of the body, about the same point.
+        """
         turning = cross(carrier.angular, self.linear) + cross(carrier.linear, self.angular)
         return Twist(turning, cross(carrier.angular, self.angular))
 
     def power(self, f: SX, m: SX) -> SX:
-        """Return the power of a force f and a moment m about the same point along the motion."""
+        """Return the power of a force and a moment along this motion.
+
+        Args:
+            f: (3, 1) force.
+            m: (3, 1) moment about the point of this motion.
+        """
         return casadi.dot(self.linear, f) + casadi.dot(self.angular, m)
 
 
@@ -72,13 +86,22 @@ class Line:
     faster: Twist
 
     def drifting(self, twice: SX) -> Line:
-        """Change to an observer that measures all velocities larger by half of `twice`."""
+        """Transform to an observer that moves differently, in place of the present observer.
+
+        Args:
+            twice: (3, 1) twice the velocity by which all velocities become larger [m/s].
+        """
         second = Twist(self.second.linear + cross(twice, self.spin), self.second.angular)
         linear = self.faster.linear + cross(twice, self.unit.angular)
         return Line(self.unit, self.spin, second, Twist(linear, self.faster.angular))
 
     def displaced(self, R: SX, p: SX) -> Line:
-        """Transform to a frame in which the current axes have origin p and orientation R."""
+        """Transform to the origin and axes of a frame i.
+
+        Args:
+            R: (3, 3) orientation of the current axes relative to i.
+            p: (3, 1) current origin in i [m].
+        """
         twists = (twist.displaced(R, p) for twist in (self.unit, self.second, self.faster))
         unit, second, faster = twists
         return Line(unit, casadi.mtimes(R, self.spin), second, faster)
@@ -106,7 +129,7 @@ class LineObserver:
 
 
 def revolute_line(dot: SX, ddot: SX, vd: SX) -> Line:
-    """Return the unit motion and rates of a revolute joint about z.
+    """Return the unit motion of a revolute joint about z, and its rates.
 
     Args:
         dot: (3, 1) rate of the direction of the axis [rad/s].
@@ -122,11 +145,11 @@ def revolute_line(dot: SX, ddot: SX, vd: SX) -> Line:
 
 
 def prismatic_line(dot: SX, ddot: SX) -> Line:
-    """Return the unit motion and rates of a prismatic joint along z.
+    """Return the unit motion of a prismatic joint along z, and its rates.
 
     Args:
-        dot: (3, 1) rate of the axis.
-        ddot: (3, 1) second rate of the axis.
+        dot: (3, 1) rate of the direction of the axis [rad/s].
+        ddot: (3, 1) second rate of the direction of the axis [rad/s^2].
     """
     return Line(
         unit=Twist(vector([0, 0, 1]), zeros()),
@@ -137,12 +160,21 @@ def prismatic_line(dot: SX, ddot: SX) -> Line:
 
 
 def free_lines(link: Link, pose: LinkPose, seen: LineObserver) -> tuple[Line, ...]:
-    """Return the unit motions and rates of a joint with several velocities."""
+    """Return the unit motions of a joint with several velocities, and their rates.
+
+    Args:
+        link: link after the joint.
+        pose: pose of the link relative to its antecedent.
+        seen: motion of the two links of the joint.
+    """
     return tuple(_free_line(Twist(*unit), seen) for unit in unit_motions(link, pose))
 
 
 def _free_line(unit: Twist, seen: LineObserver) -> Line:
-    """Return a unit motion `unit` of a joint with several velocities, and its rates."""
+    """Return the line of a joint with several velocities from its unit motion `unit`.
+
+    `seen` is the motion of the two links of the joint.
+    """
     t, s = unit.linear, unit.angular
     t_dot, s_dot = cross(seen.w, t), cross(seen.w, s)
     rate = Twist(t_dot + cross(seen.v, s), s_dot)
@@ -206,19 +238,19 @@ def joint_axes(
         i = link.antecedent
         before = motions[i] if i >= 0 else base
         if link.motion.nv > 1:
-            axes = _of_several(link, poses[j], before, motions[j], v[link.v])
+            axes = _link_frame_axes(link, poses[j], before, motions[j], v[link.v])
         elif len(poses[j].run) > 1:
-            axes = _continue(poses[j], poses[i].spin, result[i], motions[j])
+            axes = _parallel_axes(poses[j], poses[i].spin, result[i], motions[j])
         else:
-            axes = _of_one(link, poses[j], before, motions[j], v[link.v])
+            axes = _single_axis(link, poses[j], before, motions[j], v[link.v])
         result.append(axes)
     return result
 
 
-def _of_several(
+def _link_frame_axes(
     link: Link, pose: LinkPose, before: Acceleration, own: Acceleration, v: SX
 ) -> JointAxes:
-    """Return the axes of a joint with several velocities, equal to the axes of the link frame.
+    """Return the joint axes of a joint with several velocities: the axes of the link frame.
 
     Args:
         link: link after the joint.
@@ -242,10 +274,10 @@ def _of_several(
     return JointAxes(None, path, False, free_lines(link, pose, seen), own.w)
 
 
-def _of_one(
+def _single_axis(
     link: Link, pose: LinkPose, before: Acceleration, own: Acceleration, v: SX
 ) -> JointAxes:
-    """Return the axes of a joint with one velocity: joint frame on the antecedent, shifted along z.
+    """Return the axes of a joint with one velocity: its frame on the antecedent, shifted along z.
 
     Args:
         link: link after the joint.
@@ -275,8 +307,10 @@ def _of_one(
     return JointAxes(pose.spin, path, False, (line,), vector([w[0], w[1], own.w[2]]))
 
 
-def _continue(pose: LinkPose, rotation: Rotation, axes: JointAxes, own: Acceleration) -> JointAxes:
-    """Return axes parallel to those of the antecedent's joint, for a joint with a parallel axis.
+def _parallel_axes(
+    pose: LinkPose, rotation: Rotation, axes: JointAxes, own: Acceleration
+) -> JointAxes:
+    """Return joint axes parallel to those of the antecedent, for a joint with a parallel axis.
 
     Args:
         pose: pose of the link relative to its antecedent.

@@ -68,7 +68,7 @@ class VelocityField:
 
     @staticmethod
     def nothing() -> VelocityField:
-        """Return the integrals of a body without mass."""
+        """Return the integrals over no mass: zeros."""
         return VelocityField(zeros(), zeros(), zeros(), zeros(), zeros())
 
     def __add__(self, other: VelocityField) -> VelocityField:
@@ -82,16 +82,23 @@ class VelocityField:
         )
 
     def through(self, step: Displacement, velocity: SX) -> VelocityField:
-        """Transform to the frame before a displacement, whose translation changes at `velocity`."""
+        """Transform to the frame before a displacement, about its origin.
+
+        Args:
+            step: displacement to the present frame.
+            velocity: (3, 1) rate of its translation, in the axes before it [m/s].
+        """
         f, m = step.wrench(self.f, self.m)
         f_rate, m_rate = step.wrench(self.f_rate, self.m_rate)
         drag = step.rotation.apply(self.drag) + cross(velocity, f)
         return VelocityField(f, m, f_rate, m_rate, drag)
 
     def row(self, link: Link, w: SX) -> SX:
-        """Return the entries of B in the row of this unit velocity and the columns of a link.
+        """Return the entries of the Coriolis matrix B of this velocity, in the columns of a link.
 
-        B is the Coriolis matrix. The axes of the joint of `link` rotate at w (3, 1).
+        Args:
+            link: link whose joint velocities select the columns.
+            w: (3, 1) angular velocity of the axes of its joint [rad/s].
         """
         return effort_at_joint(link, cross(self.f, w), cross(self.m, w) + self.drag)
 
@@ -114,13 +121,15 @@ class SubtreeInertia:
     def of(body: PseudoInertia, spin: SX) -> SubtreeInertia:
         """Return the moments of a body at rest in the frame.
 
-        The argument `spin` is half the angular momentum (3, 1) of the rotors on the body.
+        Args:
+            body: moments of the mass of the body.
+            spin: (3, 1) half the angular momentum of the rotors on the body.
         """
         return SubtreeInertia(body, PseudoInertia(zeros(3, 3), zeros(), SX(0)), spin)
 
     @staticmethod
     def nothing() -> SubtreeInertia:
-        """Return the moments of a body without mass."""
+        """Return the moments of no mass: zeros."""
         return SubtreeInertia.of(PseudoInertia(zeros(3, 3), zeros(), SX(0)), zeros())
 
     def __add__(self, other: SubtreeInertia) -> SubtreeInertia:
@@ -130,14 +139,20 @@ class SubtreeInertia:
         )
 
     def through(self, step: Displacement) -> SubtreeInertia:
-        """Transform to the frame before a constant displacement."""
+        """Transform to the frame before a constant displacement, about its origin.
+
+        Args:
+            step: displacement to the present frame.
+        """
         _, spin = step.wrench(self.rate.ms, self.spin)
         return SubtreeInertia(step.body(self.mass), step.body(self.rate), spin)
 
     def moved(self, linear: SX, angular: SX) -> SubtreeInertia:
-        """Change to a reference frame in which the current frame moves.
+        """Transform to a reference frame that coincides with the current frame, which moves in it.
 
-        The arguments are half the linear and half the angular velocity (3, 1) of this motion.
+        Args:
+            linear: (3, 1) half the velocity of the current frame in the reference frame [m/s].
+            angular: (3, 1) half its angular velocity [rad/s].
         """
         S, ms, m = self.mass.S, self.mass.ms, self.mass.m
         flow = casadi.mtimes(linear, ms.T) + casadi.mtimes(skew(angular), S)
@@ -187,7 +202,7 @@ def rotor_column(link: Link, carrier: int, w: SX) -> VelocityField:
 
 
 def _inertia_times(S: SX, a: SX) -> SX:
-    """Return J a with the inertia tensor J = tr(S) - S, without forming terms that cancel."""
+    """Return J a (3, 1) with the inertia tensor J = tr(S) - S, without terms that cancel."""
     rows = []
     for k in range(3):
         m, n = (k + 1) % 3, (k + 2) % 3
@@ -268,7 +283,7 @@ def lagrange_form(tree: Tree, poses: list[LinkPose], v: SX) -> LagrangeForm:
     bodies = regroup(tree, poses, bodies)
     rest, base = zeros(tree.nv), resting_base(zeros())
     w = [motion.w for motion in link_accelerations(tree, poses, v, rest, base)]
-    places = _places(tree, poses, v, w)
+    places = _column_frames(tree, poses, v, w)
     spins = spin_momenta(tree, 0.5 * v)
     framed = [SubtreeInertia.of(body, spins.get(j, zeros())) for j, body in enumerate(bodies)]
     placed = [SubtreeInertia.nothing()] * len(bodies)
@@ -291,10 +306,11 @@ def lagrange_form(tree: Tree, poses: list[LinkPose], v: SX) -> LagrangeForm:
     return form
 
 
-def _places(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_FormPlace]:
-    """Choose the frame in which the columns of every joint are computed.
+def _column_frames(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_FormPlace]:
+    """Return the column frame of each joint: the frame in which its columns are computed.
 
-    A joint on the base (not backward) uses its link frame, because it has no ancestors.
+    `v` (nv, 1) are the joint velocities and `w` the angular velocities (3, 1) of the links. A joint
+    on the base (not backward) uses its link frame, because it has no ancestors.
     """
     result: list[_FormPlace] = []
     gravity: list[SX] = []
@@ -303,8 +319,8 @@ def _places(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_Form
         linear, angular = motion_behind(link, pose, v[link.v])
         w_i, g_i = (w[i], gravity[i]) if i >= 0 else (zeros(), tree.gravity)
         gravity.append(pose.apply_inverse(g_i))
-        if link.motion is Motion.REVOLUTE and _follows(tree, poses, j, w):
-            result.append(_parallel(pose, result[i], angular))
+        if link.motion is Motion.REVOLUTE and _shares_direction(tree, poses, j, w):
+            result.append(_parallel_place(pose, result[i], angular))
             continue
         steps = _moving_steps(pose, w_i, linear)
         seat = len(pose.seat)
@@ -319,11 +335,11 @@ def _places(tree: Tree, poses: list[LinkPose], v: SX, w: list[SX]) -> list[_Form
     return result
 
 
-def _follows(tree: Tree, poses: list[LinkPose], j: int, w: list[SX]) -> bool:
-    """Whether joint j is parallel to its predecessor and the common direction varies.
+def _shares_direction(tree: Tree, poses: list[LinkPose], j: int, w: list[SX]) -> bool:
+    """Return whether joint j is parallel to the previous joint and their direction varies.
 
-    If the direction is constant, the links move in a plane, and one rotation per joint keeps more
-    zeros.
+    `w` are the angular velocities of the links. If the direction is constant, the links move in a
+    plane, and one rotation per joint keeps more zeros.
     """
     run = poses[j].run
     root = tree.links[run[0]].antecedent
@@ -333,8 +349,11 @@ def _follows(tree: Tree, poses: list[LinkPose], j: int, w: list[SX]) -> bool:
     return not (turning[0].is_zero() and turning[1].is_zero())
 
 
-def _parallel(pose: LinkPose, before: _FormPlace, angular: SX) -> _FormPlace:
-    """Return the column frame of a joint, parallel to the column frame of the previous joint."""
+def _parallel_place(pose: LinkPose, before: _FormPlace, angular: SX) -> _FormPlace:
+    """Return the column frame of a joint with pose `pose`, parallel to that of the previous joint.
+
+    `before` is that of the previous joint, and `angular` (3, 1) the angular velocity of the joint.
+    """
     inner, _ = before.inner[0]
     p = inner.point(pose.foot)
     outer = FreeDisplacement(MatrixRotation(SX(DM.eye(3))), p)
@@ -353,9 +372,10 @@ def _parallel(pose: LinkPose, before: _FormPlace, angular: SX) -> _FormPlace:
 
 
 def _moving_steps(pose: LinkPose, w: SX, linear: SX) -> list[Step]:
-    """Displacements with velocities from frame i, which rotates at w, to frame j.
+    """Return the displacements from frame i to frame j, with the rates of their translations.
 
-    The last displacement translates at `linear`, in the axes of frame j.
+    `w` (3, 1) is the angular velocity of frame i. The last displacement also translates at `linear`
+    (3, 1), in the axes of frame j.
     """
     steps: list[Step] = []
     for number, step in enumerate(pose.steps, 1):
@@ -368,9 +388,12 @@ def _moving_steps(pose: LinkPose, w: SX, linear: SX) -> list[Step]:
 
 
 def _fill_columns(work: _FormWork, j: int, body: SubtreeInertia) -> None:
-    """Fill the rows and columns of joint j: its diagonal block and the blocks of its ancestors."""
+    """Fill rows and columns of joint j in place: its diagonal block and those with its ancestors.
+
+    `body` are the moments of link j and its descendants, in the column frame of the joint.
+    """
     form, link, place = work.form, work.tree.links[j], work.places[j]
-    spin = _at(place.inner, rotor_column(link, j, work.w[j]))
+    spin = _transformed(place.inner, rotor_column(link, j, work.w[j]))
     for number, (linear, angular) in enumerate(unit_motions_at_joint(link)):
         k = link.v.start + number
         column = body.column(place.w, linear, angular)
@@ -385,9 +408,10 @@ def _fill_columns(work: _FormWork, j: int, body: SubtreeInertia) -> None:
 
 
 def _add_drives(form: LagrangeForm, tree: Tree, v: SX) -> None:
-    """Add the drive inertia Ia to A. On a Free joint, it also adds Coriolis terms to B.
+    """Add the drive inertia Ia of each joint to A in place, and its Coriolis terms to B.
 
-    There Ia is also a mass, whose velocity is expressed in the rotating link frame.
+    Only a free joint has Coriolis terms: there Ia is also a mass, whose velocity is in rotating
+    axes.
     """
     for link in tree.links:
         for k in range(link.v.start, link.v.stop):
@@ -398,30 +422,30 @@ def _add_drives(form: LagrangeForm, tree: Tree, v: SX) -> None:
 
 
 def _fill_ancestors(work: _FormWork, j: int, k: int, column: VelocityField) -> None:
-    """Fill the entries of velocity k of joint j with the ancestors of j.
+    """Fill the entries of velocity k of joint j with the ancestors of j, in place.
 
-    The column is expressed in the column frame of joint j.
+    `column` contains the integrals for this velocity, in the column frame of joint j.
     """
     form, tree, places, w = work.form, work.tree, work.places, work.w
     driven = tree.links[j]
     while (i := tree.links[j].antecedent) >= 0:
         link, at_place = tree.links[i], places[j].parallel
-        column = _at(places[j].outer, column)
+        column = _transformed(places[j].outer, column)
         if tree.links[j] is driven:
             carried = rotor_column(driven, i, w[i])
-            column = column + (_at(places[i].inner, carried) if at_place else carried)
+            column = column + (_transformed(places[i].inner, carried) if at_place else carried)
         if link.backward:
-            column, at_place = _at(places[i].inner, column), True
+            column, at_place = _transformed(places[i].inner, column), True
         entries = effort_at_joint(link, column.f, column.m)
         form.A[link.v, k], form.A[k, link.v] = entries, entries.T
         form.B[link.v, k] = effort_at_joint(link, column.f_rate, column.m_rate)
         form.B[k, link.v] = column.row(link, places[i].w if at_place else w[i]).T
-        column = column if at_place else _at(places[i].inner, column)
+        column = column if at_place else _transformed(places[i].inner, column)
         j = i
 
 
-def _at(steps: list[Step], column: VelocityField) -> VelocityField:
-    """Transform a column to the frame before the displacements."""
+def _transformed(steps: list[Step], column: VelocityField) -> VelocityField:
+    """Transform the integrals `column` to the frame before successive displacements."""
     for step, velocity in reversed(steps):
         column = column.through(step, velocity)
     return column
@@ -436,7 +460,7 @@ def _at(steps: list[Step], column: VelocityField) -> VelocityField:
 
 
 def christoffel(tree: Tree, q: SX, v: SX, A: SX) -> SX:
-    """Return the Coriolis matrix B (nv, nv) from derivatives of the inertia matrix.
+    """Return the Coriolis matrix B (nv, nv) of a tree from derivatives of its inertia matrix.
 
     B = (dA/dt + D - D') / 2 with D = d(A v)/dq N(q) and dq/dt = N(q) v, plus Hamel's blocks of
     quaternion joints.
@@ -460,9 +484,9 @@ def christoffel(tree: Tree, q: SX, v: SX, A: SX) -> SX:
 
 
 def _hamel(motion: Motion, momentum: SX) -> SX:
-    """Return the matrix whose product with the joint velocity is w x p (and V x p).
+    """Return the skew-symmetric block of B of a quaternion joint, from its momentum p.
 
-    The vector p is the momentum of the joint.
+    Its product with the joint velocity is w x p, for a free joint (`motion`) also V x p.
     """
     if motion is Motion.SPHERICAL:
         return -skew(momentum)

@@ -52,12 +52,12 @@ class LinkPose:
 
     @property
     def steps(self) -> tuple[Displacement, ...]:
-        """Displacements from frame i to frame j."""
+        """Displacements from frame i to frame j: `seat`, then `motion`."""
         return self.seat + self.motion
 
     @property
     def foot(self) -> SX:
-        """(3, 1) origin of the seat in frame i [m]."""
+        """(3, 1) origin of the joint frame on link i, in frame i [m]."""
         return origin(self.seat)
 
     @property
@@ -67,41 +67,53 @@ class LinkPose:
 
     @property
     def height(self) -> SX:
-        """Distance of the frame from its seat, along the axis of the joint [m]."""
+        """Distance from the joint frame on link i to frame j, along the axis of the joint [m]."""
         return origin(self.motion)[2]
 
     @property
     def matrix(self) -> SX:
-        """(3, 3) orientation of j in i."""
+        """(3, 3) orientation of frame j relative to frame i."""
         R = Pose.identity().R
         for step in self.steps:
             R = casadi.mtimes(R, step.rotation.matrix)
         return R
 
     def at_seat(self, vector: SX) -> SX:
-        """Express a vector of frame i in the axes of the seat."""
+        """Express a vector (3, 1) of frame i in the axes of the joint frame on link i."""
         for step in self.seat:
             vector = step.rotation.apply_inverse(vector)
         return vector
 
     def apply(self, vector: SX) -> SX:
-        """Express a vector of frame j in frame i."""
+        """Express a vector (3, 1) of frame j in the axes of frame i."""
         for step in reversed(self.steps):
             vector = step.rotation.apply(vector)
         return vector
 
     def apply_inverse(self, vector: SX) -> SX:
-        """Express a vector of frame i in frame j."""
+        """Express a vector (3, 1) of frame i in the axes of frame j."""
         for step in self.steps:
             vector = step.rotation.apply_inverse(vector)
         return vector
 
     def wrench(self, f: SX, m: SX) -> Wrench:
-        """Transform a wrench about the origin of j, in frame j, to the origin and axes of i."""
+        """Transform a wrench about the origin and in axes of frame j to frame i.
+
+        Args:
+            f: (3, 1) force [N].
+            m: (3, 1) moment [N m].
+
+        Returns:
+            force and moment about the origin and in axes of frame i.
+        """
         return transform_wrench_along(self.steps, f, m)
 
     def after(self, pose: Pose) -> Pose:
-        """Return the pose of frame j in the frame in which frame i has the pose `pose`."""
+        """Return the pose of frame j relative to a third frame.
+
+        Args:
+            pose: pose of frame i relative to the third frame.
+        """
         rows = pose.R.T
         for step in self.steps:
             rows = casadi.horzcat(*(step.rotation.apply_inverse(rows[:, k]) for k in range(3)))
@@ -109,30 +121,42 @@ class LinkPose:
 
 
 def link_poses(tree: Tree, q: SX) -> list[LinkPose]:
-    """Return the pose of each link relative to its antecedent at the positions q, (nq, 1)."""
+    """Return the pose of each link relative to its antecedent, by link.
+
+    Args:
+        tree: the links.
+        q: (nq, 1) joint positions [rad or m], and quaternions.
+    """
     poses: list[LinkPose] = []
     angles: list[SX] = []
     for j, link in enumerate(tree.links):
         i, at = link.antecedent, link.placement
-        seat = _moving(*(screw for frame in link.via for screw in frame.fixed), *at.seat)
+        seat = _without_identities(
+            *(screw for frame in link.via for screw in frame.fixed), *at.seat
+        )
         angle = at.theta + q[link.q] if link.motion is Motion.REVOLUTE else at.theta
         run: tuple[int, ...] = (j,)
-        if link.motion is Motion.REVOLUTE and i >= 0 and _continues(tree.links[i], seat):
+        if link.motion is Motion.REVOLUTE and i >= 0 and _is_parallel(tree.links[i], seat):
             run, angle = (*poses[i].run, j), angles[i] + angle
         angles.append(angle)
-        seat, motion = _joint(link, seat, q[link.q])
+        seat, motion = _joint_displacements(link, seat, q[link.q])
         spin = axis_rotation("z", angle) if len(run) > 1 else motion[0].rotation
         poses.append(LinkPose(seat, motion, run, spin))
     return poses
 
 
-def _continues(before: Link, seat: tuple[ScrewDisplacement, ...]) -> bool:
-    """Whether joint `before` is revolute and parallel to a revolute joint on this seat."""
-    return before.motion is Motion.REVOLUTE and not any(_turns(step) for step in seat)
+def _is_parallel(before: Link, seat: tuple[ScrewDisplacement, ...]) -> bool:
+    """Return whether joint `before` is revolute and parallel to the axis at the end of `seat`."""
+    return before.motion is Motion.REVOLUTE and not any(_rotates(step) for step in seat)
 
 
 def base_poses(tree: Tree, poses: list[LinkPose]) -> list[Pose]:
-    """Return the pose of each link frame in the base frame."""
+    """Return the pose of each link frame in the base frame, by link.
+
+    Args:
+        tree: the links.
+        poses: pose of each link relative to its antecedent.
+    """
     result: list[Pose] = []
     for link, pose in zip(tree.links, poses, strict=True):
         i = link.antecedent
@@ -140,21 +164,29 @@ def base_poses(tree: Tree, poses: list[LinkPose]) -> list[Pose]:
     return result
 
 
-def _joint(
+def _joint_displacements(
     link: Link, seat: tuple[ScrewDisplacement, ...], q: SX
 ) -> tuple[tuple[ScrewDisplacement, ...], tuple[Displacement, ...]]:
-    """Return the seat of a joint and the displacements from the seat to the link frame."""
+    """Return the displacements to the joint frame on the antecedent, and from there to the link.
+
+    `seat` are the displacements to the joint axis, and `q` is the position of the joint.
+    """
     at = link.placement
     match link.motion:
         case Motion.REVOLUTE:
             return seat, (ScrewDisplacement.about("z", at.theta + q, at.r),)
         case Motion.PRISMATIC:
             return seat, (ScrewDisplacement.about("z", at.theta, at.r + q),)
-    return seat + _moving(ScrewDisplacement.about("z", at.theta, at.r)), (_free(link, q),)
+    return seat + _without_identities(ScrewDisplacement.about("z", at.theta, at.r)), (
+        _free_displacement(link, q),
+    )
 
 
-def _free(link: Link, q: SX) -> FreeDisplacement:
-    """Return the displacement of a spherical or free joint, inverted for a backward joint."""
+def _free_displacement(link: Link, q: SX) -> FreeDisplacement:
+    """Return the displacement of a spherical or free joint at q.
+
+    Its inverse for a backward joint.
+    """
     R = quaternion_rotation(q[link.motion.nq - 4 :])
     R = R.T if link.backward else R
     if link.motion is not Motion.FREE:
@@ -164,13 +196,13 @@ def _free(link: Link, q: SX) -> FreeDisplacement:
     )
 
 
-def _moving(*steps: ScrewDisplacement) -> tuple[ScrewDisplacement, ...]:
-    """Return the steps that are not the identity."""
-    return tuple(step for step in steps if _turns(step) or not step.t.is_zero())
+def _without_identities(*steps: ScrewDisplacement) -> tuple[ScrewDisplacement, ...]:
+    """Return the steps that are not the constant identity."""
+    return tuple(step for step in steps if _rotates(step) or not step.t.is_zero())
 
 
-def _turns(step: ScrewDisplacement) -> bool:
-    """Whether a step rotates. A tiny angle has a cosine of one and a nonzero sine."""
+def _rotates(step: ScrewDisplacement) -> bool:
+    """Return whether a step rotates. A tiny angle has a cosine of one and a nonzero sine."""
     return not (step.rotation.s.is_zero() and step.rotation.c.is_one())
 
 
@@ -182,10 +214,17 @@ def _turns(step: ScrewDisplacement) -> bool:
 
 
 def motion_at_joint(link: Link, v: SX) -> tuple[SX, SX]:
-    """Velocity (linear, angular) of link j relative to link i, in axes of constant direction.
+    """Return the velocity of link j relative to its antecedent i, in axes of constant direction.
 
-    The reference point and the axes belong to frame j or, for a backward motion, to the seat (joint
-    frame on link i).
+    The reference point and the axes belong to frame j or, for a backward joint, to the joint frame
+    on link i.
+
+    Args:
+        link: link j with its joint.
+        v: velocity of the joint, (nv, 1) for its nv velocities.
+
+    Returns:
+        linear and angular velocity, (3, 1) each.
     """
     match link.motion:
         case Motion.REVOLUTE:
@@ -204,7 +243,13 @@ def _along_z(v: SX) -> SX:
 
 
 def effort_at_joint(link: Link, f: SX, m: SX) -> SX:
-    """Project a wrench on the joint motion; the wrench is about and in the frame of the motion."""
+    """Return the joint effort of a wrench on link j.
+
+    Args:
+        link: link j with its joint.
+        f: (3, 1) force, in the axes of `motion_at_joint`.
+        m: (3, 1) moment about its reference point, in the same axes.
+    """
     match link.motion:
         case Motion.REVOLUTE:
             return m[2]
@@ -215,23 +260,44 @@ def effort_at_joint(link: Link, f: SX, m: SX) -> SX:
 
 
 def unit_motions_at_joint(link: Link) -> list[tuple[SX, SX]]:
-    """Linear and angular velocity for each unit joint velocity, as in `motion_at_joint`."""
+    """Return the (linear, angular) velocity of `motion_at_joint` for each unit joint velocity.
+
+    Args:
+        link: link j with its joint.
+    """
     identity = SX.eye(link.motion.nv)
     return [motion_at_joint(link, casadi.densify(identity[:, k])) for k in range(link.motion.nv)]
 
 
 def motion_behind(link: Link, pose: LinkPose, v: SX) -> tuple[SX, SX]:
-    """Linear and angular velocity of frame j relative to its seat, in the axes of frame j."""
-    return _behind(link, pose, motion_at_joint(link, v))
+    """Return the velocity of link j relative to its antecedent, in the axes of frame j.
+
+    Args:
+        link: link j with its joint.
+        pose: pose of the link relative to its antecedent.
+        v: velocity of the joint, (nv, 1) for its nv velocities.
+
+    Returns:
+        linear velocity of the origin of frame j, and angular velocity, (3, 1) each.
+    """
+    return _at_link_frame(link, pose, motion_at_joint(link, v))
 
 
 def unit_motions(link: Link, pose: LinkPose) -> list[tuple[SX, SX]]:
-    """Linear and angular velocity of frame j, in its axes, for each unit joint velocity."""
-    return [_behind(link, pose, unit) for unit in unit_motions_at_joint(link)]
+    """Return the (linear, angular) velocity of `motion_behind` for each unit joint velocity.
+
+    Args:
+        link: link j with its joint.
+        pose: pose of the link relative to its antecedent.
+    """
+    return [_at_link_frame(link, pose, unit) for unit in unit_motions_at_joint(link)]
 
 
-def _behind(link: Link, pose: LinkPose, velocity: tuple[SX, SX]) -> tuple[SX, SX]:
-    """Transform a result of `motion_at_joint` to the origin and axes of frame j."""
+def _at_link_frame(link: Link, pose: LinkPose, velocity: tuple[SX, SX]) -> tuple[SX, SX]:
+    """Transform a velocity of `motion_at_joint` to the origin and axes of frame j.
+
+    `velocity` is (linear, angular); `pose` is the pose of `link` relative to its antecedent.
+    """
     if not link.backward:
         return velocity
     linear, angular = velocity
@@ -241,7 +307,14 @@ def _behind(link: Link, pose: LinkPose, velocity: tuple[SX, SX]) -> tuple[SX, SX
 
 
 def effort(link: Link, pose: LinkPose, f: SX, m: SX) -> SX:
-    """Project a force f and moment m about the origin of frame j on the joint motion."""
+    """Return the joint effort of a wrench on link j.
+
+    Args:
+        link: link j with its joint.
+        pose: pose of the link relative to its antecedent.
+        f: (3, 1) force, in axes of frame j [N].
+        m: (3, 1) moment about the origin of frame j, in its axes [N m].
+    """
     if link.backward:
         f, m = transform_wrench_along(pose.motion, f, m)
     return effort_at_joint(link, f, m)
@@ -302,12 +375,12 @@ class RotationRate:
 
 
 def rotation_rate(w: SX, wd: SX, across: SX | None = None) -> RotationRate:
-    """Return U with six products of angular velocities, or five if `across` is given.
+    """Return U = skew(wd) + skew(w) skew(w), with six products of angular velocities or five.
 
     Args:
         w: (3, 1) angular velocity.
         wd: (3, 1) angular acceleration.
-        across: x^2 + y^2 of w if it is already known; then y^2 needs no product.
+        across: w[0]^2 + w[1]^2 if it is already known, which saves a product.
     """
     if across is None or w[0].is_zero() or w[1].is_zero():
         U, *spread = _rotation_rate(w, wd, SX(0), False)
@@ -318,7 +391,11 @@ def rotation_rate(w: SX, wd: SX, across: SX | None = None) -> RotationRate:
 
 @formula((3, 1), (3, 1), (1, 1))
 def _rotation_rate(w: SX, wd: SX, across: SX, known: bool) -> tuple[SX, SX, SX, SX]:
-    """Return U = skew(wd) + skew(w) skew(w), and three differences of its squared terms."""
+    """Return U = skew(wd) + skew(w) skew(w) (3, 3), and U33 - U22, U11 - U33 and U22 - U11.
+
+    `w` and `wd` (3, 1) are angular velocity and acceleration. `across` is w[0]^2 + w[1]^2 if
+    `known`, else it is computed.
+    """
     x, y, z = w[0], w[1], w[2]
     xx, zz, xy, xz, yz = x * x, z * z, x * y, x * z, y * z
     xy_square = across if known else xx + y * y
@@ -333,7 +410,7 @@ def _rotation_rate(w: SX, wd: SX, across: SX, known: bool) -> tuple[SX, SX, SX, 
 
 
 def moment_of_rotation(S: SX, rate: RotationRate) -> SX:
-    """(3, 1) moment J wd + w x (J w), from the skew part of U S.
+    """Return the moment (3, 1) J wd + w x (J w), from the skew part of U S.
 
     Row x is (U S)_zy - (U S)_yz, the integral of y (U r)_z - z (U r)_y over the mass. It needs
     thirteen products if S[2, 2] is zero.
@@ -343,13 +420,18 @@ def moment_of_rotation(S: SX, rate: RotationRate) -> SX:
         rate: rotation rate of the body.
     """
     pairs = [(rate.U[n, m], rate.U[m, n]) for m, n in ((1, 2), (2, 0), (0, 1))]
-    signs = tuple(_relation(a, b) for a, b in pairs)
+    signs = tuple(_sign_relation(a, b) for a, b in pairs)
     return _moment_of_rotation(S, rate.U, *rate.spread, signs)
 
 
 @formula((3, 3), (3, 3), (1, 1), (1, 1), (1, 1))
 def _moment_of_rotation(S: SX, U: SX, s_x: SX, s_y: SX, s_z: SX, signs: tuple[int, ...]) -> SX:
-    """Return the moment (3, 1) of `moment_of_rotation` from S, U and the spread of U."""
+    """Return the moment (3, 1) J wd + w x (J w) of a body, see `moment_of_rotation`.
+
+    `S` (3, 3) are its second moments of mass, `U` (3, 3) and s_x, s_y, s_z are `U` and `spread` of
+    its `RotationRate`. For each row k with the next indices m, n, `signs` has the `_sign_relation`
+    of U[n, m] and U[m, n].
+    """
     rows = []
     for k, spread in enumerate((s_x, s_y, s_z)):
         m, n = (k + 1) % 3, (k + 2) % 3
@@ -358,7 +440,7 @@ def _moment_of_rotation(S: SX, U: SX, s_x: SX, s_y: SX, s_z: SX, signs: tuple[in
     return casadi.vertcat(*rows)
 
 
-def _relation(a: SX, b: SX) -> int:
+def _sign_relation(a: SX, b: SX) -> int:
     """Return 1 if a = -b, -1 if a = b, else 0."""
     if SX.binary(casadi.OP_ADD, a, b).is_zero():
         return 1
@@ -366,7 +448,7 @@ def _relation(a: SX, b: SX) -> int:
 
 
 def _difference(a: SX, first: SX, b: SX, second: SX, sign: int) -> SX:
-    """Return ``a * first - b * second``, with one product if a = b or a = -b."""
+    """Return ``a * first - b * second``, with one product if `sign` is 1 (a = -b) or -1 (a = b)."""
     if sign:
         return a * (first + second if sign > 0 else first - second)
     return a * first - b * second
@@ -395,7 +477,11 @@ class Acceleration:
 
 
 def resting_base(gravity: SX) -> Acceleration:
-    """Return the motion of a fixed base; gravity (3, 1) in its frame enters as vd = -gravity."""
+    """Return the motion of a fixed base, whose acceleration is minus gravity.
+
+    Args:
+        gravity: (3, 1) gravity acceleration, in the base frame [m/s^2].
+    """
     return moving_base(zeros(), zeros(), -gravity)
 
 
@@ -403,9 +489,9 @@ def moving_base(w: SX, wd: SX, vd: SX) -> Acceleration:
     """Return the motion of a moving base.
 
     Args:
-        w: (3, 1) angular velocity, in the base frame.
-        wd: (3, 1) angular acceleration, in the base frame.
-        vd: (3, 1) acceleration of the origin minus gravity, in the base frame.
+        w: (3, 1) angular velocity, in the base frame [rad/s].
+        wd: (3, 1) angular acceleration, in the base frame [rad/s^2].
+        vd: (3, 1) acceleration of the origin minus gravity, in the base frame [m/s^2].
     """
     return Acceleration(w, wd, rotation_rate(w, wd), vd)
 
@@ -413,7 +499,7 @@ def moving_base(w: SX, wd: SX, vd: SX) -> Acceleration:
 def link_accelerations(
     tree: Tree, poses: list[LinkPose], v: SX, a: SX, base: Acceleration
 ) -> list[Acceleration]:
-    """Return the acceleration of each link in its frame.
+    """Return the velocity and acceleration of each link in its frame.
 
     Args:
         tree: links of the tree.
@@ -439,7 +525,7 @@ def link_accelerations(
 def _rotation(
     tree: Tree, poses: list[LinkPose], j: int, v: SX, a: SX, motions: list[Acceleration]
 ) -> tuple[SX, SX, RotationRate]:
-    """Angular velocity, angular acceleration and rate U of link j.
+    """Return angular velocity, angular acceleration and rate U of link j.
 
     `motions` contains the previous links and, as its last element, the base.
     """
@@ -452,7 +538,7 @@ def _rotation(
         w = w_i + angular
         wd = pose.apply_inverse(before.wd) + angular_rate + cross(w_i, angular)
         return w, wd, rotation_rate(w, wd)
-    run = _run(tree, poses, j, motions)
+    run = _parallel_run(tree, poses, j, motions)
     first = poses[run[0]]
     root = motions[tree.links[run[0]].antecedent]
     w_seat, wd_seat = first.at_seat(root.w), first.at_seat(root.wd)
@@ -466,8 +552,10 @@ def _rotation(
     return w, wd, rotation_rate(w, wd, _square_across(before, pose))
 
 
-def _run(tree: Tree, poses: list[LinkPose], j: int, motions: list[Acceleration]) -> tuple[int, ...]:
-    """Indices of the joints whose summed angles rotate the angular velocity of link j.
+def _parallel_run(
+    tree: Tree, poses: list[LinkPose], j: int, motions: list[Acceleration]
+) -> tuple[int, ...]:
+    """Return the joints whose summed angles rotate the angular velocity of link j.
 
     A run of parallel axes is joined if the angular velocity has a zero x or y component before the
     run, which a rotation at each joint would lose. Otherwise the run is joint j alone.
@@ -478,10 +566,10 @@ def _run(tree: Tree, poses: list[LinkPose], j: int, motions: list[Acceleration])
 
 
 def _square_across(before: Acceleration, pose: LinkPose) -> SX | None:
-    """Squared angular velocity normal to axis j, if an entry of U_i contains it, else None.
+    """Return the squared angular velocity normal to axis j if U of the antecedent i contains it.
 
     It is equal for both links of the joint. If axis j is parallel to coordinate axis k of frame i,
-    it is -U_i[k, k].
+    it is -U_i[k, k]. Otherwise return None.
     """
     axis = vector([0, 0, 1])
     for step in reversed(pose.seat):

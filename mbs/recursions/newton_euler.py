@@ -35,16 +35,27 @@ from mbs.spatial import PseudoInertia, Wrench, add_wrenches, cross, is_zero, zer
 def momentum_on(link: Link, carrier: int) -> SX:
     """Return the angular momentum (3, 1) of a joint's rotor per unit joint velocity [kg m^2].
 
-    It is in the frame of link `carrier`. Zero if the joint has no rotor on this link.
+    It is relative to the link that the rotor is mounted on, in its frame.
+
+    Args:
+        link: link whose joint drives the rotor.
+        carrier: index of a link. The result is zero if the rotor is not mounted on this link.
     """
     rotor = link.rotor
     return rotor.momentum if rotor is not None and rotor.carrier == carrier else zeros()
 
 
 def spin_momenta(tree: Tree, v: SX) -> dict[int, SX]:
-    """Return the angular momentum (3, 1) of rotors relative to their carrier, by link [N m s].
+    """Return the angular momentum (3, 1) of rotors relative to their links [N m s].
 
-    Index -1 is the base. Links without rotors have no entry.
+    Their links are the links that they are mounted on.
+
+    The result is by index of this link, -1 for the base, in its frame. Links without rotors have no
+    entry.
+
+    Args:
+        tree: links, rotors included.
+        v: (nv, 1) joint velocities.
     """
     total: dict[int, SX] = {}
     for link in tree.links:
@@ -55,7 +66,14 @@ def spin_momenta(tree: Tree, v: SX) -> dict[int, SX]:
 
 
 def rotor_efforts(tree: Tree, a: SX, motions: list[Acceleration], base: Acceleration) -> SX:
-    """Return joint efforts (nv, 1) that accelerate the rotation of the rotors [N m or N]."""
+    """Return the joint efforts (nv, 1) that accelerate the rotation of the rotors [N m or N].
+
+    Args:
+        tree: links, rotors included.
+        a: (nv, 1) joint accelerations.
+        motions: acceleration of each link, in its frame.
+        base: motion of the base.
+    """
     total = SX.zeros(tree.nv)
     for link in tree.links:
         if link.rotor is not None:
@@ -67,7 +85,17 @@ def rotor_efforts(tree: Tree, a: SX, motions: list[Acceleration], base: Accelera
 
 
 def rotor_moments(tree: Tree, v: SX, a: SX, motions: list[Acceleration]) -> dict[int, SX]:
-    """Return the moment (3, 1) that each link exerts on its rotors, by index of the link [N m]."""
+    """Return the moment (3, 1) [N m] that each link exerts on the rotors mounted on it.
+
+    The result is by link index, in the frame of the link. It is the rate of change of the angular
+    momentum of the rotors relative to the link. Links without rotors have no entry.
+
+    Args:
+        tree: links, rotors included.
+        v: (nv, 1) joint velocities.
+        a: (nv, 1) joint accelerations.
+        motions: acceleration of each link, in its frame.
+    """
     total: dict[int, SX] = {}
     for link in tree.links:
         if link.rotor is None or link.rotor.carrier < 0:
@@ -79,10 +107,12 @@ def rotor_moments(tree: Tree, v: SX, a: SX, motions: list[Acceleration]) -> dict
 
 
 def rotor_energy(tree: Tree, v: SX, w: list[SX]) -> SX:
-    """Kinetic energy of the spin of rotors, in addition to locked rotors [J].
+    """Return the kinetic energy [J] of the rotation of rotors relative to their links.
+
+    It is the energy in addition to that of rotors locked to their links.
 
     Args:
-        tree: links of the tree.
+        tree: links, rotors included.
         v: (nv, 1) joint velocities.
         w: angular velocity (3, 1) of each link, in its frame.
     """
@@ -122,7 +152,9 @@ def newton_euler(
     base: Acceleration,
     external: dict[int, Wrench] | None = None,
 ) -> Dynamics:
-    """Inverse dynamics for joint accelerations a, without drives, joint friction and springs.
+    """Return the inverse dynamics of a tree for joint accelerations a.
+
+    Drives, joint friction and springs are not included.
 
     The forward pass computes accelerations, the backward pass wrenches, with regrouped inertial
     parameters.
@@ -163,7 +195,15 @@ def newton_euler(
 
 
 def inertial_wrench(body: PseudoInertia, motion: Acceleration) -> Wrench:
-    """Wrench that moves a body: F = m vd + U ms, M = J wd + w x (J w) + ms x vd."""
+    """Return the wrench that accelerates a body: F = m vd + U ms, M = J wd + w x (J w) + ms x vd.
+
+    Args:
+        body: inertia of the body, about the origin and in axes of its frame.
+        motion: motion of the frame; its acceleration vd includes minus gravity.
+
+    Returns:
+        force [N] and moment about the origin [N m], (3, 1) each, in axes of the frame.
+    """
     f = body.m * motion.vd + casadi.mtimes(motion.rate.U, body.ms)
     return f, moment_of_rotation(body.S, motion.rate) + cross(body.ms, motion.vd)
 
@@ -174,7 +214,7 @@ def inertial_wrench(body: PseudoInertia, motion: Acceleration) -> Wrench:
 
 
 def joint_efforts(tree: Tree, q: SX, v: SX, a: SX) -> SX:
-    """(nv, 1) efforts of rotor inertia, friction and spring of each joint [N m or N].
+    """Return the efforts (nv, 1) of rotor inertia, friction and spring of each joint [N m or N].
 
     Args:
         tree: links of the tree.
@@ -186,21 +226,36 @@ def joint_efforts(tree: Tree, q: SX, v: SX, a: SX) -> SX:
 
 
 def rotor_and_friction(tree: Tree, v: SX, a: SX) -> SX:
-    """(nv, 1) Ia a + Fv v + Fs tanh(v / Fs_width) of each joint [N m or N].
+    """Return the efforts (nv, 1) Ia a + Fv v + Fs tanh(v / Fs_width) of all joints [N m or N].
 
-    tanh replaces sign(v) of the source, so that integrators and optimisers can use the same model.
-    A width of zero selects sign(v).
+    They overcome rotor inertia, viscous and Coulomb friction. tanh replaces sign(v) of the source,
+    so that integrators and optimisers can use the same model. A width of zero selects sign(v).
+
+    Args:
+        tree: links of the tree.
+        v: (nv, 1) velocities.
+        a: (nv, 1) accelerations.
     """
     return casadi.vertcat(*(_rotor_and_friction(link, v[link.v], a[link.v]) for link in tree.links))
 
 
 def spring_effort(tree: Tree, q: SX) -> SX:
-    """(nv, 1) efforts stiffness (q - rest) that balance the joint springs [N m or N]."""
+    """Return the efforts (nv, 1) stiffness (q - rest) that balance the joint springs [N m or N].
+
+    Args:
+        tree: links of the tree.
+        q: (nq, 1) positions.
+    """
     return casadi.vertcat(*(_spring_effort(link, q[link.q]) for link in tree.links))
 
 
 def spring_energy(tree: Tree, q: SX) -> SX:
-    """Energy of the joint springs, zero at their rest positions [J]."""
+    """Return the energy [J] of the joint springs, zero at their rest positions.
+
+    Args:
+        tree: links of the tree.
+        q: (nq, 1) positions.
+    """
     total = SX(0)
     for link in tree.links:
         if not link.stiffness.is_zero():
@@ -209,14 +264,17 @@ def spring_energy(tree: Tree, q: SX) -> SX:
 
 
 def _spring_effort(link: Link, q: SX) -> SX:
-    """Return the effort of the spring of a joint at position q; zero without a spring."""
+    """Return the effort that balances the spring of a joint at its position q; zero without one."""
     if link.stiffness.is_zero():
         return zeros(link.motion.nv)
     return link.stiffness * (q - link.rest)
 
 
 def _rotor_and_friction(link: Link, v: SX, a: SX) -> SX:
-    """Return efforts of rotor inertia and friction of a joint at velocity v, acceleration a."""
+    """Return the effort of rotor inertia and friction of a joint.
+
+    `v` and `a` are velocity and acceleration of the joint, (n, 1).
+    """
     total = zeros(link.motion.nv)
     if link.motion is Motion.FREE:  # the linear velocity is in rotating axes
         a = a + casadi.vertcat(cross(v[3:6], v[0:3]), zeros())
@@ -236,7 +294,15 @@ def _rotor_and_friction(link: Link, v: SX, a: SX) -> SX:
 
 
 def newton_euler_names(dynamics: Dynamics) -> list[tuple[str, SX]]:
-    """Return the names and scalars of the Newton-Euler recursions."""
+    """Return pairs (SYMORO name, scalar) of the intermediate results of a Newton-Euler recursion.
+
+    Constants and single symbols are left out. The first letters of a name are W and WP (angular
+    velocity and acceleration), U (its matrix), VP (acceleration), F and NO (force and moment of the
+    link itself), E and N (force and moment that the joint transmits). Digits are element and link.
+
+    Args:
+        dynamics: results of `newton_euler`.
+    """
     named: list[tuple[str, SX]] = []
     for j, motion in enumerate(dynamics.motions, 1):
         own, joint = dynamics.own[j - 1], dynamics.wrenches[j - 1]
@@ -255,7 +321,10 @@ def newton_euler_names(dynamics: Dynamics) -> list[tuple[str, SX]]:
 
 
 def _elements(name: str, matrix: SX, link: int) -> list[tuple[str, SX]]:
-    """Return the elements of a matrix that are neither constant nor a single symbol."""
+    """Return pairs (name, element) of a matrix of link number `link`, counted from 1.
+
+    Constants and single symbols are left out.
+    """
     rows, columns = matrix.shape
     named = []
     for column in range(columns):

@@ -62,12 +62,12 @@ class SubtreeMotion:
 
     @staticmethod
     def zero() -> SubtreeMotion:
-        """Return the value of an empty subtree."""
+        """Return the quantities of no link: zeros."""
         return SubtreeMotion(Inertia.zero(), zeros(3, 3), zeros(), zeros(), zeros())
 
     @staticmethod
     def of_link(pseudo: PseudoInertia, motion: Acceleration, spin: SX, moment: SX) -> SubtreeMotion:
-        """Return the value of one link, for an observer at the origin of its frame.
+        """Return the quantities of a single link, for an observer at the origin of its frame.
 
         Args:
             pseudo: inertia of the link, about and in its frame.
@@ -96,12 +96,15 @@ class SubtreeMotion:
         )
 
     def rotate(self, R: Rotation) -> SubtreeMotion:
-        """Transform to the axes of frame i; R is the orientation of the current axes in i."""
+        """Transform to axes with the same origin.
+
+        R maps a vector from current axes to the new axes.
+        """
         f, m = R.apply(self.f), R.apply(self.m)
         return SubtreeMotion(self.body.rotate(R), R.apply_to_square(self.K), R.apply(self.n), f, m)
 
     def shift(self, axis: int, t: SX) -> SubtreeMotion:
-        """Transform to a frame in which the current origin is at t [m] on a coordinate axis."""
+        """Transform to the frame in which the current origin is at t [m] on the axis 0, 1 or 2."""
         if t.is_zero():
             return self
         K, m = SX(self.K), SX(self.m)
@@ -115,7 +118,11 @@ class SubtreeMotion:
         return SubtreeMotion(self.body.shift(axis, t), K, self.n, self.f, m)
 
     def drifting(self, twice: SX) -> SubtreeMotion:
-        """Change to an observer that measures all velocities larger by half of `twice`."""
+        """Transform to an observer that moves differently, in place of the present observer.
+
+        Args:
+            twice: (3, 1) twice the velocity by which all velocities become larger [m/s].
+        """
         ms, K = self.body.ms, SX(self.K)
         for k in range(3):
             for h in {0, 1, 2} - {k}:
@@ -124,33 +131,39 @@ class SubtreeMotion:
         return SubtreeMotion(self.body, K, self.n + self.body.m * twice, self.f, self.m)
 
     def through(self, step: AxesStep) -> SubtreeMotion:
-        """Transform along one step of the path between two joint axes."""
+        """Transform along one step (displacement or change of observer) between joint axes."""
         if isinstance(step, MovingFrame):
             return self.drifting(step.twice)
         return step.body(self)
 
     def wrench_of(self, twist: Twist) -> Wrench:
-        """Return the momentum for a velocity `twist`, or the wrench for an acceleration `twist`."""
+        """Return the momentum of the subtree if it moves as one body with the velocity `twist`.
+
+        It is the wrench if `twist` is an acceleration.
+        """
         return self.body.momentum(twist.linear, twist.angular)
 
     def wrench_of_spin(self, s: SX) -> Wrench:
-        """Return the change of the wrench by an additional angular velocity s of the subtree."""
+        """Return the change of the wrench by an angular velocity s (3, 1) added to the subtree."""
         return cross(s, self.n), casadi.mtimes(self.K, s)
 
     def wrench_of_displacement(self, unit: Twist) -> Wrench:
-        """Return the rate of the wrench if it moves along `unit` with the subtree."""
+        """Return the derivative of the wrench by a displacement of the subtree along `unit`."""
         t, s = unit.linear, unit.angular
         return cross(s, self.f), cross(s, self.m) + cross(t, self.f)
 
     def spin_of(self, unit: Twist) -> SX:
-        """Return the gradient (3, 1) of the effort along `unit` by an added angular velocity."""
+        """Return the gradient (3, 1) of the effort along `unit`.
+
+        It is the gradient by an angular velocity that is added to the whole subtree.
+        """
         return casadi.mtimes(self.K.T, unit.angular) + cross(self.n, unit.linear)
 
 
 def subtree_motions(
     tree: Tree, axes: list[JointAxes], own: list[SubtreeMotion]
 ) -> list[SubtreeMotion]:
-    """Return the composite quantities of the subtree of each joint, in the joint axes.
+    """Return the quantities of the subtree of each joint (link and descendants), in the joint axes.
 
     Args:
         tree: links of the tree.
@@ -192,7 +205,7 @@ class RotorMoment:
     da: SX
 
     def rotate(self, R: Rotation) -> RotorMoment:
-        """Transform to the axes of frame i; R is the orientation of the current axes in i."""
+        """Transform to other axes; R maps a vector from current axes to the new axes."""
         return RotorMoment(R.apply(self.dv), R.apply(self.da))
 
 
@@ -214,7 +227,7 @@ class EffortColumn:
     spin: SX
 
     def through(self, step: AxesStep) -> EffortColumn:
-        """Transform along one step of the path between two joint axes."""
+        """Transform along one step (displacement or change of observer) between joint axes."""
         if isinstance(step, MovingFrame):
             return self.drifting(step.twice)
         return EffortColumn(
@@ -225,24 +238,42 @@ class EffortColumn:
         )
 
     def rotate(self, R: Rotation) -> EffortColumn:
-        """Transform to the axes of frame i; R is the orientation of the current axes in i."""
+        """Transform to axes with the same origin.
+
+        R maps a vector from current axes to the new axes.
+        """
         dq, dv, momentum = ((R.apply(f), R.apply(m)) for f, m in (self.dq, self.dv, self.momentum))
         return EffortColumn(dq, dv, momentum, R.apply(self.spin))
 
     def drifting(self, twice: SX) -> EffortColumn:
-        """Change to an observer that measures all velocities larger by half of `twice`."""
+        """Transform to an observer that moves differently, in place of the present observer.
+
+        Args:
+            twice: (3, 1) twice the velocity by which all velocities become larger [m/s].
+        """
         spin = self.spin + cross(twice, self.momentum[0])
         return EffortColumn(self.dq, self.dv, self.momentum, spin)
 
     def with_couple(self, couple: RotorMoment) -> EffortColumn:
-        """Add the moments of a rotor that spins with the joint."""
+        """Return the derivatives with the moment of a rotor that rotates with the joint.
+
+        Args:
+            couple: derivatives of this moment, in the same axes.
+        """
         (f_v, m_v), (f_a, m_a) = self.dv, self.momentum
         return EffortColumn(
             self.dq, (f_v, m_v + couple.dv), (f_a, m_a + couple.da), self.spin + couple.dv
         )
 
     def row(self, line: Line) -> tuple[SX, SX, SX]:
-        """Derivatives of the effort of this joint by position, velocity, acceleration of `line`."""
+        """Return the derivatives of the effort of this joint by the motion of another joint.
+
+        Args:
+            line: unit motion of the other joint, in the same axes.
+
+        Returns:
+            derivatives by position, velocity and acceleration of the other joint.
+        """
         return (
             line.second.power(*self.momentum) + casadi.dot(self.spin, line.spin),
             line.faster.power(*self.momentum) + casadi.dot(self.spin, line.unit.angular),
@@ -250,13 +281,25 @@ class EffortColumn:
         )
 
     def efforts(self, line: Line) -> tuple[SX, SX, SX]:
-        """Derivatives of the effort of `line` by position, velocity, acceleration of this joint."""
+        """Return the derivatives of the effort of another joint by the motion of this joint.
+
+        Args:
+            line: unit motion of the other joint, in the same axes.
+
+        Returns:
+            derivatives by position, velocity and acceleration of this joint.
+        """
         unit = line.unit
         return unit.power(*self.dq), unit.power(*self.dv), unit.power(*self.momentum)
 
 
 def effort_column(subtree: SubtreeMotion, line: Line) -> EffortColumn:
-    """Return the derivatives by a joint that moves a subtree along `line`, in the joint axes."""
+    """Return the derivatives of the wrench of a subtree by the joint that moves it.
+
+    Args:
+        subtree: quantities of the subtree, in the joint axes.
+        line: unit motion of the joint, in the joint axes.
+    """
     spinning = add_wrenches(subtree.wrench_of(line.second), subtree.wrench_of_spin(line.spin))
     return EffortColumn(
         dq=add_wrenches(spinning, subtree.wrench_of_displacement(line.unit)),
@@ -267,7 +310,12 @@ def effort_column(subtree: SubtreeMotion, line: Line) -> EffortColumn:
 
 
 def rotor_couple(rotor: CarriedRotor, axes: JointAxes) -> RotorMoment:
-    """Return the moment derivatives of a rotor, in the joint axes `axes` of its carrier link."""
+    """Return the derivatives of the moment on a rotor by velocity and acceleration of its joint.
+
+    Args:
+        rotor: rotor that is driven by the joint.
+        axes: joint axes of the link that the rotor is mounted on; the result is in these axes.
+    """
     momentum = rotor.momentum if axes.rotation is None else axes.rotation.apply(rotor.momentum)
     return RotorMoment(cross(axes.w, momentum), momentum)
 
@@ -285,17 +333,21 @@ transform a line to the base."""
 
 
 def links_by_base(tree: Tree, axes: list[JointAxes]) -> set[int]:
-    """Return the links whose columns need fewer operations in base axes.
+    """Return the links whose derivative columns need fewer operations in base axes.
 
     Empty if the total saving does not pay for the base axes. In base axes a pair of joints has a
     constant cost. On the path through joint axes the cost grows with the distance of the joints,
     and is reduced by right angles and zero distances.
+
+    Args:
+        tree: the links.
+        axes: axes of the joints, by link.
     """
     saved: dict[int, int] = {}
     for j, link in enumerate(tree.links):
         path = tree.path(j)
         pairs = sum(tree.links[i].motion.nv for i in path[:-1])
-        walk = sum(_cost(step) for i in path[1:] for step in axes[i].path)
+        walk = sum(_step_cost(step) for i in path[1:] for step in axes[i].path)
         turns = sum(
             axes[i].rotation is not None and not axes[k].parallel for i, k in pairwise(path)
         )
@@ -305,7 +357,7 @@ def links_by_base(tree: Tree, axes: list[JointAxes]) -> set[int]:
     return set(saved) if sum(saved.values()) > _BASE_LINE * tree.nv else set()
 
 
-def _cost(step: AxesStep) -> int:
+def _step_cost(step: AxesStep) -> int:
     """Return the number of operations that transform a derivative column along a step."""
     match step:
         case MovingFrame():
@@ -338,7 +390,12 @@ class BaseAxes:
 
 
 def base_axes(tree: Tree, axes: list[JointAxes]) -> list[BaseAxes]:
-    """Return the axes of all joints relative to the base."""
+    """Return the axes of all joints relative to the base, by link.
+
+    Args:
+        tree: links of the tree.
+        axes: axes of each joint, relative to the axes of its antecedent.
+    """
     result: list[BaseAxes] = []
     for link, own in zip(tree.links, axes, strict=True):
         i = link.antecedent
@@ -349,15 +406,18 @@ def base_axes(tree: Tree, axes: list[JointAxes]) -> list[BaseAxes]:
             if turn is not None and not own.parallel:
                 R = _rotate(R, turn)
         for step in reversed(own.path):
-            R, p, twice = _after(step, R, p, twice)
+            R, p, twice = _axes_after(step, R, p, twice)
         place = FreeDisplacement(MatrixRotation(R), p)
         lines = (line.displaced(R, p).drifting(twice) for line in own.lines)
         result.append(BaseAxes(place, twice, tuple(lines)))
     return result
 
 
-def _after(step: AxesStep, R: SX, p: SX, twice: SX) -> tuple[SX, SX, SX]:
-    """Return orientation R, origin p and doubled velocity of axes after a step, in the base."""
+def _axes_after(step: AxesStep, R: SX, p: SX, twice: SX) -> tuple[SX, SX, SX]:
+    """Return orientation, origin and doubled velocity, in the base, of the axes after a step.
+
+    `R` (3, 3), `p` (3, 1) and `twice` (3, 1) are those of the axes before the step.
+    """
     if isinstance(step, MovingFrame):
         return R, p, twice + casadi.mtimes(R, step.twice)
     p = p + casadi.mtimes(R, step.point(zeros()))
@@ -365,7 +425,7 @@ def _after(step: AxesStep, R: SX, p: SX, twice: SX) -> tuple[SX, SX, SX]:
 
 
 def _rotate(R: SX, turn: Rotation) -> SX:
-    """Return R times the matrix of a rotation."""
+    """Return R times the matrix of the rotation `turn`, (3, 3)."""
     return casadi.horzcat(*(turn.apply_inverse(R[k, :].T) for k in range(3))).T
 
 
@@ -395,7 +455,7 @@ class EffortDerivatives:
 def newton_euler_derivatives(
     tree: Tree, poses: list[LinkPose], v: SX, a: SX, base: Acceleration
 ) -> EffortDerivatives:
-    """Return the derivatives of the efforts of `newton_euler`.
+    """Return the derivatives of the joint efforts of `newton_euler`.
 
     A backward pass computes composite inertia, Coriolis terms and wrench of each subtree. For each
     joint they determine the derivatives of the subtree wrench by its position, velocity and
@@ -409,8 +469,8 @@ def newton_euler_derivatives(
         base: motion of the base; see `resting_base`.
 
     Returns:
-        derivatives along the velocities of the joints, in the order of v [N m or N, by the unit
-        of the velocity].
+        derivatives along the velocities of the joints, in the order of v [N m or N, by the unit of
+        the velocity].
     """
     bodies = [PseudoInertia.of(link.inertia) for link in tree.links]
     poses, bodies = shift_frames(tree, poses, bodies, base_rests=is_zero(base.w))
@@ -436,7 +496,10 @@ def newton_euler_derivatives(
 def _fill(
     result: EffortDerivatives, tree: Tree, axes: list[JointAxes], subtrees: list[SubtreeMotion]
 ) -> None:
-    """Fill the derivatives of the efforts, joint by joint with all ancestor joints."""
+    """Fill the derivatives of the efforts in place, joint by joint with all ancestor joints.
+
+    `subtrees` are the quantities of the subtree of each joint.
+    """
     by_base = links_by_base(tree, axes)
     placed = base_axes(tree, axes) if by_base else []
     for j, link in enumerate(tree.links):
@@ -465,9 +528,9 @@ def _fill(
 def _rotor_couples(
     tree: Tree, axes: list[JointAxes], j: int
 ) -> tuple[RotorMoment | None, RotorMoment | None]:
-    """Return moment derivatives of the rotor of joint j: if on link j, if on its antecedent.
+    """Return the moment derivatives of the rotor of joint j in two variants, at least one None.
 
-    At least one of the two is None.
+    The first is set if the rotor is mounted on link j, the second if it is on the antecedent.
     """
     rotor = tree.links[j].rotor
     if rotor is None or rotor.carrier < 0:
@@ -503,7 +566,11 @@ def _through_axes(
 def _through_base(
     tree: Tree, placed: list[BaseAxes], j: int, column: EffortColumn, couple: RotorMoment | None
 ) -> Iterator[Passage]:
-    """Yield a column of joint j in base axes, with each joint on its path; see `_through_axes`."""
+    """Yield a column of joint j in base axes, with each joint on its path to the base.
+
+    `column` is in the axes of joint j, `placed` are the axes of joints relative to the base, and
+    `couple` is as in `_through_axes`.
+    """
     i = tree.links[j].antecedent
     column = column.through(placed[j].place).drifting(placed[j].twice)
     if couple is not None:
@@ -515,7 +582,11 @@ def _through_base(
 def _set_own(
     result: EffortDerivatives, k: int, start: int, lines: tuple[Line, ...], column: EffortColumn
 ) -> None:
-    """Set row k of the derivatives at the columns of a joint, whose first velocity is `start`."""
+    """Set row k of the derivatives at the columns of a joint, in place.
+
+    `start` is the index of the first velocity of the joint, `lines` are its unit motions, and
+    `column` has the derivatives by velocity k.
+    """
     for h, line in enumerate(lines, start):
         result.dq[k, h], result.dv[k, h], result.A[k, h] = column.row(line)
 
@@ -523,9 +594,10 @@ def _set_own(
 def _turn_row(
     result: EffortDerivatives, k: int, start: int, lines: tuple[Line, ...], subtree: SubtreeMotion
 ) -> None:
-    """Add to row k of dq the term of a backward joint.
+    """Add to row k of dq the term of a backward joint, in place.
 
-    Its unit motions are fixed on the antecedent and do not move with the joint itself.
+    Its unit motions `lines` are fixed on the antecedent and do not move with the joint itself.
+    `start` is the index of its first velocity, and `subtree` has the wrench of its subtree.
     """
     unit = lines[k - start].unit
     for h, line in enumerate(lines, start):
@@ -535,7 +607,11 @@ def _turn_row(
 def _set_pairs(
     result: EffortDerivatives, k: int, start: int, lines: tuple[Line, ...], column: EffortColumn
 ) -> None:
-    """Set the entries of velocity k and of an ancestor joint, whose first velocity is `start`."""
+    """Set the entries of velocity k with an ancestor joint, in place, in both triangles.
+
+    `start` is the index of the first velocity of the ancestor joint, `lines` are its unit motions,
+    and `column` has the derivatives by velocity k in the same axes.
+    """
     _set_own(result, k, start, lines, column)
     for h, line in enumerate(lines, start):
         result.dq[h, k], result.dv[h, k], result.A[h, k] = column.efforts(line)

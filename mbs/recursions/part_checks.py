@@ -86,11 +86,10 @@ _AT_ONCE = ("loads", "energy", "rows", "velocity_rows", "frictions", "stops", "e
 
 
 def _require_state_between(system: System, part: ComponentInstance, at: PartsAt) -> None:
-    """Raise if an input depends on accelerations or forces and may change them directly.
+    """Raise AssemblyError if an input that may change accelerations depends on them.
 
-    Raises:
-        AssemblyError: the component has a method of `_AT_ONCE`, and an input is wired to a signal
-            of accelerations or forces.
+    This is the case if the component `part` has a method of `_AT_ONCE`, and an input is wired to a
+    signal of accelerations or forces.
     """
     later = casadi.vertcat(SX(0, 1), *(later_signal(system, one) for one in later_sources(system)))
     if not later.numel() or not part.element.has(*_AT_ONCE):
@@ -137,7 +136,7 @@ class _Check:
         self.seen = at.with_inputs(part, self.inputs)
 
     def run(self) -> None:
-        """Run all checks."""
+        """Run all checks. Raise AssemblyError at the first fault."""
         energy, heat = self._scalar("energy"), self._scalar("dissipation")
         if energy is not None:
             self._require_free_of(energy, "energy", self.v, "velocities")
@@ -157,8 +156,11 @@ class _Check:
 
     # Checks of the returned values.
 
-    def _returned(self, method: str, at: At | None = None) -> Any:
-        """Call a method of the component; an exception becomes an AssemblyError that names it."""
+    def _result_of(self, method: str, at: At | None = None) -> Any:
+        """Return the result of a method of the component, called with the symbolic motion `at`.
+
+        An exception of the method becomes an AssemblyError that names it.
+        """
         try:
             return getattr(self.element, method)(self.seen if at is None else at)
         except ExpressionError as error:  # a parameter self.k, not at.k, multiplies a symbol
@@ -176,18 +178,22 @@ class _Check:
             ) from error
 
     def _mapping(self, method: str, at: At | None = None) -> Mapping[str, Any]:
-        """Return the dict that a method of the component returns; raise if it is no dict."""
-        found = self._returned(method, at)
+        """Return the dict that a method of the component returns.
+
+        Raise AssemblyError if it is no dict.
+        """
+        found = self._result_of(method, at)
         if not isinstance(found, Mapping):
             raise AssemblyError(
-                f"{self._title}: {method} returns {_kind(found)}; return a dict by name"
+                f"{self._title}: {method} returns {_value_text(found)}; return a dict by name"
             )
         return found
 
     def _loads(self) -> Mapping[str, Any]:
-        """Return the loads of the component by port, or minus the derivatives of its energy.
+        """Return the loads of the component by port; raise AssemblyError if they are not valid.
 
-        Empty if the component exerts no load.
+        Without a method `loads` they are minus the derivatives of its energy. Empty if the
+        component exerts no load.
         """
         if not self.element.acts:
             return {}
@@ -208,10 +214,10 @@ class _Check:
         return found
 
     def _require_wrench(self, port: str, load: Any) -> None:
-        """Raise AssemblyError unless the load of a frame port is a force and a moment."""
+        """Raise AssemblyError unless the load of a frame port is a force and a moment (3, 1)."""
         if not isinstance(load, FrameLoad):
             raise AssemblyError(
-                f"{self._title}: loads gives {_kind(load)} at the frame {port}; give"
+                f"{self._title}: loads gives {_value_text(load)} at the frame {port}; give"
                 " custom.force(...), custom.torque(...) or what custom.pull(...) returns"
             )
         for what, value in (("force", load.force), ("moment", load.moment)):
@@ -223,7 +229,10 @@ class _Check:
             self._require_known(SX(value), f"loads at {port}")
 
     def _named(self, method: str, names: Iterable[str]) -> Mapping[str, SX]:
-        """Values of a method that must return exactly one value for each name."""
+        """Return the values of a method of the component by name.
+
+        Raise AssemblyError unless it returns exactly one value for each of `names`.
+        """
         wanted = list(names)
         if not wanted and not self.element.has(method):
             return {}
@@ -243,12 +252,12 @@ class _Check:
         return {name: self._value(f"{method} of {name}", found[name]) for name in wanted}
 
     def _outputs(self) -> Mapping[str, SX]:
-        """Return the outputs of the component, with one value for each of their names."""
+        """Return the outputs by name; raise AssemblyError unless each name has one value."""
         self.seen.__dict__["lam"] = self.at.row_efforts().get(self.part.name, {})
         return self._named("outputs", self.element.output_names)
 
     def _figures(self) -> None:
-        """Check that the drawing of the component can be evaluated at default parameters."""
+        """Raise AssemblyError if the drawing cannot be evaluated at default parameters."""
         known = {p.name: p.default for p in self.system.parameters if p.default is not None}
         try:
             self.element.drawn(known)
@@ -261,7 +270,10 @@ class _Check:
             ) from error
 
     def _rows(self) -> None:
-        """Check unit, symbols and number of the constraint rows; velocity rows must be linear."""
+        """Check unit, symbols and number of the constraint rows; raise AssemblyError for a fault.
+
+        Velocity rows must be linear in velocities. Rows must determine all unknowns.
+        """
         count, bound = 0, list[SX]()
         for method in ("rows", "velocity_rows"):
             if not self.element.has(method):
@@ -300,23 +312,23 @@ class _Check:
             )
 
     def _events(self, modes: Sequence[str]) -> None:
-        """Check events: types, labels, and modes that they set.
+        """Check types and labels of events, and the states that they set.
 
-        Args:
-            modes: names of the component states that are modes.
+        Raise AssemblyError for a fault. `modes` are the states that are modes; an event must set
+        each of them.
         """
         set_somewhere: set[str] = set()
         for label, event in (self._mapping("events") if self.element.has("events") else {}).items():
             if not isinstance(event, Event):
                 raise AssemblyError(
-                    f"{self._title}: events gives {_kind(event)} for {label!r}; give"
+                    f"{self._title}: events gives {_value_text(event)} for {label!r}; give"
                     " custom.Event(when, {state: value})"
                 )
             self._value(f"when of the event {label!r}", event.when)
             if not isinstance(event.then, Mapping):
                 raise AssemblyError(
-                    f"{self._title}: the event {label!r} sets {_kind(event.then)}; give a dict of"
-                    " states and modes, which may be empty"
+                    f"{self._title}: the event {label!r} sets {_value_text(event.then)}; give a"
+                    " dict of states and modes, which may be empty"
                 )
             for name, value in event.then.items():
                 if name not in self.part.states:
@@ -334,7 +346,7 @@ class _Check:
                 )
 
     def _contacts(self) -> None:
-        """Check frictions and stops: types, labels, velocities, and values at random states."""
+        """Check the labels and laws of frictions and stops; raise AssemblyError for a fault."""
         labels = dict[str, str]()
         for method, kinds, give in (
             ("stops", (Stop, OneWay), "custom.Stop(gap) or custom.OneWay(velocity)"),
@@ -347,7 +359,8 @@ class _Check:
                     )
                 if not isinstance(law, kinds):
                     raise AssemblyError(
-                        f"{self._title}: {method} gives {_kind(law)} for {label!r}; give {give}"
+                        f"{self._title}: {method} gives {_value_text(law)} for {label!r};"
+                        f" give {give}"
                     )
                 if label in labels:
                     raise AssemblyError(
@@ -358,7 +371,7 @@ class _Check:
                 self._contact(label, law)
 
     def _limits(self) -> None:
-        """Check that `limits` returns pairs of constant expressions by coordinate."""
+        """Raise AssemblyError unless `limits` returns pairs of constant expressions."""
         found = self._mapping("limits") if self.element.has("limits") else {}
         for port, pair in found.items():
             if port not in self.part.coordinates:
@@ -368,8 +381,8 @@ class _Check:
                 )
             if not isinstance(pair, (tuple, list)) or len(pair) != 2:
                 raise AssemblyError(
-                    f"{self._title}: limits gives {_kind(pair)} for {port}; give (lower, upper),"
-                    " None for no limit"
+                    f"{self._title}: limits gives {_value_text(pair)} for {port}; give (lower,"
+                    " upper), None for no limit"
                 )
             every = casadi.vertcat(self.q, self.v, self.system.z, *self.inputs.values())
             for given in pair:
@@ -378,7 +391,10 @@ class _Check:
                     self._require_free_of(value, f"a limit of {port}", every, "the motion")
 
     def _contact(self, label: str, law: Friction | Stop | OneWay) -> None:
-        """Check the law of a stop, friction or one-way element."""
+        """Check the law of a stop, a friction or a one-way element, called `label`.
+
+        Raise AssemblyError for a fault.
+        """
         own = {*self.element.output_names, *self.part.states, *self.part.inputs}
         for column in ("mode", "effort"):
             if not label and column in own:
@@ -388,29 +404,32 @@ class _Check:
                 )
         if law.unit not in (None, "N", "N.m"):
             raise AssemblyError(
-                f"{self._title}: the effort{_of(label)} has the unit {quoted(law.unit)}; use 'N'"
-                " or 'N.m'"
+                f"{self._title}: the effort{_of_label(label)} has the unit {quoted(law.unit)}; use"
+                " 'N' or 'N.m'"
             )
         if isinstance(law, Friction):
             self._contact_velocity("slip", label, law.slip)
-            limit = self._value(f"limit{_of(label)}", law.limit)
+            limit = self._value(f"limit{_of_label(label)}", law.limit)
             sticking = limit
             if law.sticking is not None:
-                sticking = self._value(f"sticking{_of(label)}", law.sticking)
-            told = "friction is a finite effort, never below zero; write casadi.fmax"
-            self._require_range(f"the limit{_of(label)}", limit, 0.0, np.inf, told)
-            told = "at rest friction holds at least its limit, so make it larger"
+                sticking = self._value(f"sticking{_of_label(label)}", law.sticking)
+            remedy = "friction is a finite effort, never below zero; write casadi.fmax"
+            self._require_range(f"the limit{_of_label(label)}", limit, 0.0, np.inf, remedy)
+            remedy = "at rest friction holds at least its limit, so make it larger"
             at_rest = self._without_slip(law.slip, limit)
             sticking = self._without_slip(law.slip, sticking)
-            self._require_range(f"sticking{_of(label)}", sticking, at_rest, np.inf, told)
+            self._require_range(f"sticking{_of_label(label)}", sticking, at_rest, np.inf, remedy)
         elif isinstance(law, OneWay):
             self._contact_velocity("velocity", label, law.velocity)
         else:
             self._stop(label, law)
 
     def _contact_velocity(self, what: str, label: str, given: Any) -> None:
-        """Check that a contact velocity is linear in v, with a constant term of parameters only."""
-        name = f"the {what}{_of(label)}"
+        """Raise AssemblyError unless the contact velocity `given` is linear in v.
+
+        Its constant term may depend on parameters only. `what` and `label` name it in the message.
+        """
+        name = f"the {what}{_of_label(label)}"
         value = self._value(name, given)
         signals = casadi.vertcat(self.system.z, self.system.u, *self.inputs.values())
         self._require_free_of(value, name, signals, "states or inputs")
@@ -428,15 +447,18 @@ class _Check:
             )
 
     def _without_slip(self, slip: SX, value: SX) -> SX:
-        """Evaluate an expression at the velocities nearest to v with zero slip."""
+        """Return the expression `value` at the velocities nearest to v at which `slip` is zero."""
         slip = SX(slip)
         slopes = casadi.jacobian(slip, self.v).T
         nearest = self.v - slopes * slip / (casadi.sumsqr(slopes) + NONZERO)
         return casadi.substitute(value, self.v, nearest)
 
     def _stop(self, label: str, law: Stop) -> None:
-        """Check that the gap depends on positions, and the limits and numbers on parameters."""
-        name = f"the gap{_of(label)}"
+        """Raise AssemblyError unless the gap of a stop depends on positions.
+
+        Its limits may depend on parameters only. `label` names the stop in the message.
+        """
+        name = f"the gap{_of_label(label)}"
         gap = self._value(name, law.gap)
         signals = casadi.vertcat(self.system.z, self.system.u, *self.inputs.values())
         self._require_free_of(gap, name, signals, "states or inputs")
@@ -452,22 +474,26 @@ class _Check:
         for field in ("lower", "upper", "restitution", "rest_speed"):
             given = getattr(law, field)
             if given is not None:
-                values[field] = self._value(f"{field}{_of(label)}", given)
-                self._require_free_of(values[field], f"{field}{_of(label)}", every, "the motion")
-        told = "give a number between 0 and 1"
-        self._require_range(f"restitution{_of(label)}", values["restitution"], 0.0, 1.0, told)
-        told, slowest = "give more than zero", values["rest_speed"]
-        self._require_range(f"rest_speed{_of(label)}", slowest, NONZERO, np.inf, told)
+                values[field] = self._value(f"{field}{_of_label(label)}", given)
+                self._require_free_of(
+                    values[field], f"{field}{_of_label(label)}", every, "the motion"
+                )
+        remedy = "give a number between 0 and 1"
+        self._require_range(
+            f"restitution{_of_label(label)}", values["restitution"], 0.0, 1.0, remedy
+        )
+        remedy, slowest = "give more than zero", values["rest_speed"]
+        self._require_range(f"rest_speed{_of_label(label)}", slowest, NONZERO, np.inf, remedy)
         if "lower" in values and "upper" in values:
-            told, high = "give more than lower", values["upper"]
-            self._require_range(f"upper{_of(label)}", high, values["lower"], np.inf, told)
+            remedy, high = "give more than lower", values["upper"]
+            self._require_range(f"upper{_of_label(label)}", high, values["lower"], np.inf, remedy)
 
     def _require_range(
-        self, what: str, value: SX, least: SX | float, greatest: SX | float, told: str
+        self, what: str, value: SX, least: SX | float, greatest: SX | float, remedy: str
     ) -> None:
-        """Raise if a value is not finite or outside a range at a random state.
+        """Raise AssemblyError if a value is not between `least` and `greatest` at a random state.
 
-        `told` is the remedy in the error message.
+        It must also be finite. `what` is its name and `remedy` the remedy in the message.
         """
         symbols = casadi.vertcat(self.system.z, *self.inputs.values())
         given = [self.q, self.v, symbols, self.system.p]
@@ -475,10 +501,10 @@ class _Check:
         for point in self._probes():
             x, low, high = (float(one) for one in found(*point))
             if not np.isfinite(x) or not low <= x <= high:
-                raise AssemblyError(f"{self._title}: {what} is {x:.6g} at a random state; {told}")
+                raise AssemblyError(f"{self._title}: {what} is {x:.6g} at a random state; {remedy}")
 
     def _crossings(self) -> None:
-        """Check the event indicators of the component: known symbols only, and no inputs."""
+        """Raise AssemblyError if an event indicator has unknown symbols or depends on inputs."""
         for label, given in self._mapping("crossings", self.at.at(self.part)).items():
             what, value = f"the crossing {label!r}", given
             if isinstance(given, Approach):
@@ -489,13 +515,16 @@ class _Check:
             self._require_free_of(self._value(what, value), what, self.system.u, "inputs")
 
     def _scalar(self, method: str) -> SX | None:
-        """Return the expression that a method returns; None if the component has no such method."""
+        """Return the scalar expression of a method; None if the component has no such method."""
         if not self.element.has(method):
             return None
-        return self._value(method, self._returned(method))
+        return self._value(method, self._result_of(method))
 
     def _value(self, what: str, value: Any) -> SX:
-        """Convert a returned value to an expression (1, 1) of known symbols, or raise."""
+        """Return a value as an expression (1, 1) of known symbols.
+
+        Raise AssemblyError if it is none. `what` is its name in the message.
+        """
         try:
             found = SX(value)
         except Exception:
@@ -504,7 +533,7 @@ class _Check:
             shape = "" if found.shape == (0, 0) else f" of the shape {found.shape}"
             of_self = isinstance(value, (Expression, Signal))
             raise AssemblyError(
-                f"{self._title}: {what} is {_kind(value)}{shape};"
+                f"{self._title}: {what} is {_value_text(value)}{shape};"
                 f" {_FROM_AT if of_self else 'give one number or expression'}"
             )
         self._require_known(found, what)
@@ -513,7 +542,10 @@ class _Check:
     # Checks of the symbols in expressions.
 
     def _require_known(self, value: SX, what: str) -> None:
-        """Raise AssemblyError if a value contains a symbol that the system does not have."""
+        """Raise AssemblyError if an expression has symbols or operations that models do not accept.
+
+        `what` is its name in the message.
+        """
         known = casadi.vertcat(
             self.q,
             self.v,
@@ -546,7 +578,10 @@ class _Check:
                 )
 
     def _require_free_of(self, value: SX, what: str, symbols: SX, name: str) -> None:
-        """Raise AssemblyError if a value depends on `symbols`, called `name` in the message."""
+        """Raise AssemblyError if a value depends on `symbols`.
+
+        `what` and `name` are the names of the value and of the symbols in the message.
+        """
         if symbols.numel() and casadi.depends_on(value, symbols):
             remedy = "; use velocity_rows" if "row" in what and name == "velocities" else ""
             raise AssemblyError(
@@ -554,7 +589,7 @@ class _Check:
             )
 
     def _require_linear(self, label: str, value: SX) -> None:
-        """Raise AssemblyError unless a velocity row is linear in v, without a constant term."""
+        """Raise AssemblyError unless the velocity row `label` is linear in v and zero at rest."""
         slopes = casadi.jacobian(value, self.v)
         rest = casadi.substitute(value, self.v, SX.zeros(self.v.numel()))
         if casadi.depends_on(slopes, self.v) or not casadi.simplify(rest).is_zero():
@@ -572,7 +607,11 @@ class _Check:
         heat: SX | None,
         rates: Mapping[str, SX],
     ) -> None:
-        """Check the power balance P = -dE/dt - D of loads, energy and dissipation."""
+        """Check the power balance P = -dE/dt - D at random states; raise AssemblyError for a fault.
+
+        P is the power of `loads` on the ports, E the `energy`, and D (`heat`) the dissipation.
+        `rates` are the rates of the states of the component.
+        """
         system, symbols = self.system, casadi.vertcat(self.system.z, *self.inputs.values())
         E = SX(0) if energy is None else energy
         rate = casadi.jtimes(E, self.q, position_rate(system.tree, self.q, self.v))
@@ -601,7 +640,7 @@ class _Check:
                 self._require_balance((P - back[0]) / 2, (dE - back[1]) / 2, 0.0, sizes.max())
 
     def _require_balance(self, P: float, dE: float, heat: float, size: float) -> None:
-        """Raise AssemblyError unless P + dE + heat is zero, relative to `size` [W]."""
+        """Raise AssemblyError unless P + dE + heat is zero, relative to `size`; all in W."""
         if abs(P + dE + heat) > _SAME * size:
             raise AssemblyError(
                 f"{self._title}: its loads have the power {P:.6g} W at a random state, but its"
@@ -610,7 +649,7 @@ class _Check:
             )
 
     def _power(self, loads: Mapping[str, Any]) -> SX:
-        """Return the power [W] of all loads of the component along its ports."""
+        """Return the power [W] of all loads of the component, for the velocities of its ports."""
         total = SX(0)
         for port, load in loads.items():
             seen = getattr(self.seen, port)
@@ -626,7 +665,7 @@ class _Check:
         return total
 
     def _probes(self) -> Iterable[tuple[Array, Array, Array, Array]]:
-        """Yield random positions, velocities, component states with inputs, and parameters."""
+        """Yield four random (q, v, states of components followed by inputs, parameters)."""
         system, rng = self.system, np.random.default_rng(_SEED)
         p = np.array([1.0 if x.default is None else x.default for x in system.parameters])
         for _ in range(_PROBES):
@@ -644,12 +683,12 @@ class _Check:
         return f"{self.part.name} ({type(self.element).__name__})"
 
 
-def _of(label: str) -> str:
-    """Return " of 'label'" for error messages; empty for an empty label."""
+def _of_label(label: str) -> str:
+    """Return " of 'label'" for error messages; empty if the label is empty."""
     return f" of {label!r}" if label else ""
 
 
-def _kind(value: Any) -> str:
+def _value_text(value: Any) -> str:
     """Return a short description of a value for error messages."""
     if value is None:
         return "nothing"

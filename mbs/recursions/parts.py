@@ -49,13 +49,21 @@ def later_signal(system: System, source: WireSource) -> SX:
     """Return the symbol of a sensor signal that depends on accelerations or forces.
 
     `with_readings` of `mbs.models._measurements` substitutes its value in rates and outputs.
+
+    Args:
+        system: system that caches the symbol.
+        source: sensor and signal.
     """
     symbol: SX = system.recent("readings", source, lambda: SX.sym(str(source)), _MOST_READINGS)
     return symbol
 
 
 def later_sources(system: System) -> list[WireSource]:
-    """Return the sensor signals of accelerations and forces that are wired to component inputs."""
+    """Return the sensor signals of accelerations or forces that are wired to component inputs.
+
+    Args:
+        system: system with the components and sensors.
+    """
     sensors = {attached.sensor.name: attached for attached in system.sensors}
     wired = [s for part in system.parts for s in part.inputs.values() if isinstance(s, WireSource)]
     return [
@@ -67,7 +75,10 @@ def later_sources(system: System) -> list[WireSource]:
 
 
 def _is_later(attached: AttachedSensor, name: str) -> bool:
-    """Whether a sensor's signal depends on accelerations or forces, which are computed later."""
+    """Return whether the signal `name` of a sensor depends on accelerations or forces.
+
+    These are computed after the signals of positions and velocities.
+    """
     if attached.sensor.reads in ("absolute", "relative"):
         return name in ("a", "wd")
     return name == "a" if attached.sensor.reads == "coordinate" else attached.joint is not None
@@ -115,21 +126,35 @@ class PartsAt:
     # Arguments of the methods of components.
 
     def at(self, part: ComponentInstance) -> At:
-        """Return the argument of the methods of a component, with wired inputs."""
+        """Return the argument `at` of the methods of a component, with inputs from its wires.
+
+        Args:
+            part: component of the system.
+        """
         if part.name not in self._found:
-            self._found[part.name] = self._seen(part, self._inputs_of(part))
+            self._found[part.name] = self._values_at(part, self._inputs_of(part))
         return self._found[part.name]
 
     def with_inputs(self, part: ComponentInstance, inputs: Mapping[str, SX]) -> At:
-        """Return the argument of the methods of a component for the given input values."""
-        return self._seen(part, {name: partial(_same, value) for name, value in inputs.items()})
+        """Return the argument `at` of the methods of a component, with given input values.
+
+        Args:
+            part: component of the system.
+            inputs: value of each input, by name.
+        """
+        return self._values_at(
+            part, {name: partial(_identity, value) for name, value in inputs.items()}
+        )
 
     def _inputs_of(self, part: ComponentInstance) -> Mapping[str, Callable[[], SX]]:
-        """Return functions that evaluate the inputs of a component, by name."""
+        """Return a function that evaluates the wired signal of each input, by input name."""
         return {name: partial(self._input, part, name) for name in part.inputs}
 
-    def _seen(self, part: ComponentInstance, inputs: Mapping[str, Callable[[], Any]]) -> At:
-        """Return the ports, inputs and parameters of a component as its methods access them."""
+    def _values_at(self, part: ComponentInstance, inputs: Mapping[str, Callable[[], Any]]) -> At:
+        """Return the argument `at` of the methods of a component.
+
+        `inputs` are functions that evaluate its inputs, by name.
+        """
         element, values = part.element, dict[str, Callable[[], Any]](inputs)
         # ports on points of bodies
         frames = dict(zip(element.frames, part.frames, strict=True))
@@ -142,20 +167,27 @@ class PartsAt:
         for name in element.names_of("parameter"):
             given = getattr(element, name)
             values[name] = (
-                partial(_same, None) if given is None else partial(to_sx, given, part.symbols)
+                partial(_identity, None) if given is None else partial(to_sx, given, part.symbols)
             )
         for name, symbol in part.states.items():
-            values[name] = partial(_same, symbol)
+            values[name] = partial(_identity, symbol)
         return At(part.name, part.symbols, values)
 
     def _frame(self, port: str, frames: Mapping[str, Frame]) -> FrameAt:
-        """Return the motion of the frame that a port of a component is attached to."""
+        """Return the motion of the frame of a port.
+
+        `frames` are all frames of the component by port.
+        """
         return FrameAt(port, lambda seen_from: self._relative(seen_from, port, frames))
 
     def _relative(
         self, seen_from: FrameAt | None, port: str, frames: Mapping[str, Frame]
     ) -> RelativeMotion:
-        """Return the motion of a port's frame relative to another port's frame, or to the base."""
+        """Return the motion of the frame of a port relative to that of another port.
+
+        The other port is `seen_from`, or the base. `frames` are all frames of the component by
+        port.
+        """
         a = BASE if seen_from is None else frames[seen_from.port]
         motion = relative_motion(self.tree, a, frames[port], self.q, self.moving)
         if not self._twists:
@@ -167,7 +199,10 @@ class PartsAt:
         return RelativeMotion(motion.p, R, V, motion.w + casadi.mtimes(R, t_b[3:]) - t_a[3:])
 
     def _coordinate(self, part: ComponentInstance, port: str) -> CoordinateAt | FlangeAt | SX:
-        """Return position and velocity of the coordinate that a port of a component acts on."""
+        """Return position and velocity of the coordinate that a port of a component acts on.
+
+        For an unknown, return its position only.
+        """
         levers = part.coordinates[port]
         q: SX | None = self._shifts.get(port, SX(0))
         for lever in levers:
@@ -189,12 +224,15 @@ class PartsAt:
     # Signals.
 
     def _input(self, part: ComponentInstance, name: str) -> SX:
-        """Return the signal or constant expression that is wired to an input."""
+        """Return the signal or constant (1, 1) that is wired to an input of a component."""
         given = part.inputs[name]
         return given if isinstance(given, SX) else self.signal(given)
 
     def signal(self, source: WireSource) -> SX:
         """Return the signal of a wire: a state or output of a component, or a sensor signal.
+
+        Args:
+            source: component or sensor, and its signal.
 
         Raises:
             AssemblyError: the signal depends on itself, or on forces that the equations of motion
@@ -202,7 +240,7 @@ class PartsAt:
         """
         for attached in self.system.sensors:
             if attached.sensor.name == source.owner:
-                return self._reading(attached, source)
+                return self._sensor_signal(attached, source)
         if source in self._signals:
             found = self._signals[source]
             if found is None:
@@ -234,7 +272,10 @@ class PartsAt:
     def _with_placeholders(
         self, part: ComponentInstance
     ) -> tuple[Mapping[str, SX], Mapping[str, SX]]:
-        """Outputs of a component as expressions of input symbols, and these symbols by name."""
+        """Return the outputs of a component in symbols of its inputs, and these symbols.
+
+        By name.
+        """
         if part.name not in self._outputs:
             symbols = {name: SX.sym(name) for name in part.inputs}
             seen = self.with_inputs(part, symbols)
@@ -242,11 +283,10 @@ class PartsAt:
             self._outputs[part.name] = part.element.outputs(seen), symbols
         return self._outputs[part.name]
 
-    def _reading(self, attached: AttachedSensor, source: WireSource) -> SX:
-        """Sensor signal; a symbol if it depends on accelerations or forces.
+    def _sensor_signal(self, attached: AttachedSensor, source: WireSource) -> SX:
+        """Return a sensor signal (1, 1); a symbol if it depends on accelerations or forces.
 
-        Raises:
-            AssemblyError: the sensor measures a cut joint.
+        Raise AssemblyError if the sensor measures a joint at which a loop is cut open.
         """
         sensor = attached.sensor
         name, _, element = source.signal.partition(".")
@@ -271,7 +311,13 @@ class PartsAt:
     # Loads, energy, rates, events and outputs.
 
     def loads(self, part: ComponentInstance) -> Mapping[str, Load]:
-        """Return the loads of a component by port: method `loads`, else minus energy gradient."""
+        """Return the loads of a component on its ports, by port.
+
+        They are returned by its method `loads`, or are minus the derivatives of its energy.
+
+        Args:
+            part: component of the system.
+        """
         if part.name not in self._loads:
             element = part.element
             if element.has("loads"):
@@ -288,7 +334,7 @@ class PartsAt:
         value: Callable[[At], SX],
         inputs: Mapping[str, SX] | None = None,
     ) -> Mapping[str, Load]:
-        """Return the gradient of a scalar by small displacements of the ports, as loads by port.
+        """Return the derivatives of a scalar by small displacements of the ports, as loads by port.
 
         Frames are translated and rotated in their own axes, coordinates are displaced; the
         derivatives are forces, moments and efforts. Inputs are constant.
@@ -310,7 +356,7 @@ class PartsAt:
         moved = replace(part, frames=frames)
         nearby = PartsAt(self.system, self.q, shifts=shifts)
         if inputs is None:
-            found = value(nearby._seen(moved, self._inputs_of(part)))
+            found = value(nearby._values_at(moved, self._inputs_of(part)))
         else:
             found = value(nearby.with_inputs(moved, inputs))
         slopes = casadi.gradient(found, every)
@@ -351,11 +397,15 @@ class PartsAt:
 
     @staticmethod
     def _own_load(load: Load) -> FrameLoad:
+        """Return the load of a frame port, which the type of `Load` does not distinguish."""
         assert isinstance(load, FrameLoad)
         return load
 
     def efforts(self) -> SX:
-        """(nv, 1) joint efforts that balance the components on coordinates, without drives."""
+        """Return the joint efforts (nv, 1) that balance the components on coordinates [N m or N].
+
+        Drives are not included.
+        """
         total = SX.zeros(self.tree.nv)
         for part in self.parts:
             if part.coordinates and not part.element.drives:
@@ -363,7 +413,7 @@ class PartsAt:
         return total
 
     def delivered(self) -> SX:
-        """(nv, 1) joint efforts that drives exert on the coordinates [N m or N]."""
+        """Return the joint efforts (nv, 1) that drives exert on the coordinates [N m or N]."""
         total = SX.zeros(self.tree.nv)
         for part in self.parts:
             if part.element.drives:
@@ -371,7 +421,10 @@ class PartsAt:
         return total
 
     def _add_efforts(self, total: SX, part: ComponentInstance, sign: int) -> None:
-        """Add sign times the efforts on the coordinates of a component to `total` (nv, 1)."""
+        """Add the efforts of a component on coordinates to `total` (nv, 1) in place, times `sign`.
+
+        `sign` is 1 or -1.
+        """
         loads = self.loads(part)
         for port, levers in part.coordinates.items():
             if port in loads:
@@ -382,7 +435,7 @@ class PartsAt:
                     total[lever.velocity] += lever.factor * own
 
     def energy(self) -> SX:
-        """Energy that the components store [J]."""
+        """Return the energy [J] that the components store."""
         total = SX(0)
         for part in self.parts:
             if part.element.has("energy"):
@@ -390,7 +443,13 @@ class PartsAt:
         return total
 
     def frame_loads(self, part: ComponentInstance) -> list[tuple[str, Frame, FrameLoad]]:
-        """Return port, frame, and load on the frame in its axes about its origin, for each load."""
+        """Return (port, frame, load) for each load of a component on a frame.
+
+        Loads are in axes of the frame, about its origin.
+
+        Args:
+            part: component of the system.
+        """
         loads, result = self.loads(part), []
         for port, frame in zip(part.element.frames, part.frames, strict=True):
             load = loads.get(port)
@@ -403,7 +462,7 @@ class PartsAt:
         return result
 
     def rates(self) -> SX:
-        """(nz, 1) rates of the states of all components."""
+        """Return the rates (nz, 1) of the states of all components; zero for modes."""
         rates = [SX(0, 1)]
         for part in self.parts:
             if part.states:
@@ -413,7 +472,7 @@ class PartsAt:
         return casadi.vertcat(*rates)
 
     def events(self) -> list[PartEvent]:
-        """Events of all components, in order."""
+        """Return the events of all components, in the order of components and labels."""
         found, first = list[PartEvent](), 0
         for part in self.parts:
             if part.element.has("events"):
@@ -425,9 +484,10 @@ class PartsAt:
         return found
 
     def crossings(self, *, of_bends: bool = True) -> list[Approach]:
-        """Event indicators of the points at which laws of components are not smooth.
+        """Return indicators of the points at which the laws of components are not smooth.
 
-        An indicator that is given as an expression gets the speed 0 and pace 0.
+        The sign of an indicator changes there. An indicator that is given as an expression gets the
+        speed 0 and pace 0.
 
         Args:
             of_bends: whether to include continuous laws of this package with discontinuous
@@ -446,7 +506,7 @@ class PartsAt:
         return found
 
     def approaches(self, found: Sequence[Approach]) -> SX:
-        """(nc, 2) speed and pace of each event indicator, see `Approach`.
+        """Return speed and pace (nc, 2) of each event indicator, see `Approach`.
 
         A rotating path may return to an obstacle. So the norm of the angular velocities on which
         the rate of an indicator depends is added to its pace.
@@ -469,17 +529,19 @@ class PartsAt:
         return casadi.vertcat(*rows)
 
     def modes(self) -> SX:
-        """(nm, 1) symbols of the modes of all components."""
+        """Return the symbols (nm, 1) of the modes (discrete states) of all components."""
         found = [SX(0, 1)]
         for part in self.parts:
             found += [part.states[name] for name in part.element.names_of("mode")]
         return casadi.vertcat(*found)
 
     def laws(self) -> SX:
-        """(n, 1) loads, rates and wired signals of user-defined components without `crossings`.
+        """Return the values (n, 1) of user-defined components whose discontinuities are unknown.
 
-        Their discontinuities are unknown. Components of this package are continuous or define
-        `crossings`. Outputs of user-defined components affect the motion only through wires.
+        They are the loads, rates and wired signals of components without `crossings`.
+
+        Components of this package are continuous or define `crossings`. Outputs of user-defined
+        components affect the motion only through wires.
         """
         found, by_user = [SX(0, 1)], dict[str, bool]()
         for part in self.parts:
@@ -502,7 +564,7 @@ class PartsAt:
         return casadi.vertcat(*map(casadi.vec, found))
 
     def outputs(self, lam: SX | None = None) -> SX:
-        """(ny, 1) outputs of all components.
+        """Return the outputs (ny, 1) of all components.
 
         Args:
             lam: (r, 1) efforts of the rows of components in the order of `effort_symbols`; by
@@ -521,7 +583,7 @@ class PartsAt:
         return every if lam is None else casadi.substitute(every, self.effort_symbols, lam)
 
     def row_efforts(self) -> Mapping[str, Mapping[str, SX]]:
-        """Symbols of the efforts of constraint rows, by component and label."""
+        """Return the symbols of the efforts (multipliers) of rows, by component and label."""
         if self._efforts is None:
             self._efforts = {}
             for velocities in (False, True):
@@ -543,7 +605,7 @@ class PartsAt:
         return casadi.vertcat(SX(0, 1), *order)
 
 
-def _same(value: Any) -> Any:
+def _identity(value: Any) -> Any:
     """Return the value unchanged."""
     return value
 
@@ -566,7 +628,7 @@ class PartEvent:
 
 
 def part_event_names(system: System) -> tuple[tuple[str, str], ...]:
-    """Return the component name and label of each event of a system, in order."""
+    """Return (component name, label) of each event of the components of a system, in order."""
 
     def names() -> tuple[tuple[str, str], ...]:
         q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
@@ -577,7 +639,7 @@ def part_event_names(system: System) -> tuple[tuple[str, str], ...]:
 
 
 def after_events(system: System, events: Sequence[PartEvent], fired: SX) -> SX:
-    """(nz, 1) component states after events.
+    """Return the component states (nz, 1) after events.
 
     Args:
         system: system with the components.
@@ -595,7 +657,9 @@ def after_events(system: System, events: Sequence[PartEvent], fired: SX) -> SX:
 
 
 def part_rows(at: PartsAt, *, velocities: bool = False) -> list[tuple[str, list[tuple[str, Row]]]]:
-    """Return name and labelled constraint rows of each component that has rows.
+    """Return (component name, labelled constraint rows) of each component that has rows.
+
+    Components with position rows come first.
 
     Args:
         at: evaluated components.
@@ -611,5 +675,9 @@ def part_rows(at: PartsAt, *, velocities: bool = False) -> list[tuple[str, list[
 
 
 def as_row(row: Row | SX) -> Row:
-    """Convert an expression to a Row with the default unit, m."""
+    """Return an expression as a Row with the default unit, m; a Row is returned unchanged.
+
+    Args:
+        row: constraint of a component.
+    """
     return row if isinstance(row, Row) else Row(SX(row))

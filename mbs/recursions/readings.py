@@ -24,7 +24,11 @@ def frame_readings(
     velocities: list[Velocity] | None,
     accelerations: list[Acceleration] | None = None,
 ) -> Readings:
-    """Return the readings of a sensor on frames of links.
+    """Return the readings of a sensor on frames of links, by name of the quantity.
+
+    A distance sensor reads L [m] and its rate Ld [m/s]. Other sensors read position p [m], velocity
+    v [m/s] and angular velocity w [rad/s] of a frame b relative to a frame a (3, 1), its
+    orientation R (3, 3), and with accelerations a [m/s^2] and wd [rad/s^2].
 
     Args:
         tree: the links.
@@ -48,14 +52,26 @@ def frame_readings(
 
 
 def axes_of(attached: AttachedSensor) -> Frame:
-    """Return the frame in whose axes a sensor expresses its vectors."""
+    """Return the frame in whose axes a sensor expresses its vectors: the base, or frame a or b.
+
+    Args:
+        attached: sensor of a system.
+    """
     frames = attached.frames
     a, b = frames if len(frames) == 2 else (BASE, *frames)
     return {"world": BASE, "body": b, "a": a, "b": b}[getattr(attached.sensor, "axes", "b")]
 
 
 def in_axes(tree: Tree, q: SX, vectors: Readings, axes: Frame, home: Frame) -> Readings:
-    """Express vectors of the frame `home` in the frame `axes`."""
+    """Express vectors of one frame in the axes of another frame.
+
+    Args:
+        tree: the links.
+        q: (nq, 1) positions.
+        vectors: vectors (3, 1) in axes of `home`, by name.
+        axes: frame of the new axes.
+        home: frame of the present axes.
+    """
     if axes is home:
         return vectors
     R = relative_pose(tree, q, axes, home).R
@@ -69,7 +85,7 @@ def coordinate_readings(
     v: SX | None,
     a: SX | None = None,
 ) -> Readings:
-    """Return the position, velocity and acceleration of a coordinate, as far as they exist.
+    """Return position "q", velocity "v" and acceleration "a" of a coordinate, as far as they exist.
 
     Args:
         name: name of the coordinate.

@@ -62,11 +62,16 @@ class ColumnSum:
 
     @property
     def products(self) -> int:
-        """Number of products per element."""
+        """Number of products to compute an element: terms whose constant is not 1 or -1."""
         return sum(not (c.is_one() or c.is_minus_one()) for c, _ in self.terms)
 
     def of(self, before: SX, own: SX) -> SX:
-        """Return the element of a row, from the rows (1, 10) of link i and of link j."""
+        """Return the element in one row of the regressor.
+
+        Args:
+            before: (1, 10) row of the antecedent i.
+            own: (1, 10) row of link j.
+        """
         total = SX(0)
         for constant, columns in self.terms:
             part = SX(0)
@@ -77,7 +82,7 @@ class ColumnSum:
 
 
 def fill_rows(tree: Tree, poses: list[LinkPose], height: int, links: list[Elements]) -> list[SX]:
-    """Return the columns (height, 10) of the inertial parameters of each link.
+    """Return the regressor columns (height, 10) of the inertial parameters of each link.
 
     Args:
         tree: links of the tree.
@@ -101,9 +106,14 @@ def fill_rows(tree: Tree, poses: list[LinkPose], height: int, links: list[Elemen
 
 
 def column_sums(tree: Tree, poses: list[LinkPose], j: int) -> dict[int, ColumnSum]:
-    """Return the columns of link j that need fewer products as sums, by parameter index.
+    """Return the columns of link j that are cheaper as sums of other columns, by parameter index.
 
     Empty for a link on the base.
+
+    Args:
+        tree: links of the tree.
+        poses: pose of each link relative to its antecedent.
+        j: index of the link.
     """
     link = tree.links[j]
     if link.antecedent < 0:
@@ -123,7 +133,11 @@ def column_sums(tree: Tree, poses: list[LinkPose], j: int) -> dict[int, ColumnSu
 
 
 def _sum(motion: Motion, pose: LinkPose, part: tuple[int, ...]) -> ColumnSum:
-    """Express the last column of `part` by columns of link i and by the other column of `part`."""
+    """Return the last column of `part` as a sum of columns of the antecedent.
+
+    `part` are the indices of one or two parameters. The other column, if any, is subtracted.
+    `motion` and `pose` are those of the joint and its link.
+    """
     ten = zeros(10)
     for k in part:
         ten[k] = 1
@@ -137,7 +151,10 @@ def _sum(motion: Motion, pose: LinkPose, part: tuple[int, ...]) -> ColumnSum:
 
 
 def _group(constants: list[SX]) -> tuple[tuple[SX, tuple[tuple[int, int], ...]], ...]:
-    """Group column indices by their constant up to the sign; zero constants are dropped."""
+    """Return the constants grouped by equal value up to sign: (constant, ((column, sign), ...)).
+
+    Zero constants are dropped.
+    """
     groups: list[tuple[SX, list[tuple[int, int]]]] = []
     for column, constant in enumerate(constants):
         if constant.is_zero():
@@ -174,22 +191,31 @@ class PathTwist:
     n: SX
 
     def at(self, p: SX) -> PathTwist:
-        """Transform to the point p, (3, 1) in the same axes."""
+        """Transform to another point, in the same axes.
+
+        Args:
+            p: (3, 1) vector from the present point to the new point [m].
+        """
         return PathTwist(self.row, self.t + cross(self.n, p), self.n)
 
     def seen(self, turn: Callable[[SX], SX]) -> PathTwist:
-        """Apply a rotation of axes to both vectors."""
+        """Return the twist in other axes; `turn` expresses a vector (3, 1) in these axes."""
         return PathTwist(self.row, turn(self.t), turn(self.n))
 
     def rate(self, of: Velocity) -> PathTwist:
-        """Return the rate of the twist if it is fixed on a link with the velocity `of`."""
+        """Return the rate of this twist if it is fixed on a link with the velocity `of`."""
         t = cross(of.V, self.n) + cross(of.w, self.t)
         return PathTwist(self.row, t, cross(of.w, self.n))
 
 
 def path_twists(tree: Tree, poses: list[LinkPose]) -> list[list[PathTwist]]:
-    """Return for each link the unit velocities of all joints on its path, in its frame."""
-    return _carry(tree, poses, _unit_twists(tree, poses))
+    """Return for each link the unit velocities of all joints on its path, in the frame of the link.
+
+    Args:
+        tree: links of the tree.
+        poses: pose of each link relative to its antecedent.
+    """
+    return _path_twists(tree, poses, _unit_twists(tree, poses))
 
 
 def path_twist_rates(
@@ -205,14 +231,17 @@ def path_twist_rates(
         velocities: velocity of each link in its frame.
     """
     own = [
-        [twist.rate(_of_directions(tree, poses[j], velocities, j)) for twist in twists]
+        [twist.rate(_direction_velocity(tree, poses[j], velocities, j)) for twist in twists]
         for j, twists in enumerate(_unit_twists(tree, poses))
     ]
-    return _carry(tree, poses, own)
+    return _path_twists(tree, poses, own)
 
 
-def _of_directions(tree: Tree, pose: LinkPose, velocities: list[Velocity], j: int) -> Velocity:
-    """Return the velocity, in frame j, of the link to which the directions of joint j are fixed."""
+def _direction_velocity(tree: Tree, pose: LinkPose, velocities: list[Velocity], j: int) -> Velocity:
+    """Return the velocity, in frame j, of the link to which the directions of joint j are fixed.
+
+    `pose` is the pose of link j, and `velocities` are those of the links in their frames.
+    """
     if not tree.links[j].backward:
         return velocities[j]
     i = tree.links[j].antecedent
@@ -222,7 +251,13 @@ def _of_directions(tree: Tree, pose: LinkPose, velocities: list[Velocity], j: in
 
 
 def seen_by_links(tree: Tree, poses: list[LinkPose], vector: SX) -> list[SX]:
-    """Express a vector (3, 1) of the base in the frame of each link."""
+    """Return a vector (3, 1) given in the base frame in the axes of each link, by link.
+
+    Args:
+        tree: the links.
+        poses: pose of each link relative to its antecedent.
+        vector: (3, 1) vector in axes of the base.
+    """
     result: list[SX] = []
     for link, pose in zip(tree.links, poses, strict=True):
         first = poses[pose.run[0]] if len(pose.run) > 1 else pose
@@ -233,15 +268,20 @@ def seen_by_links(tree: Tree, poses: list[LinkPose], vector: SX) -> list[SX]:
 
 
 def _unit_twists(tree: Tree, poses: list[LinkPose]) -> list[list[PathTwist]]:
-    """Return the twists of the unit joint velocities of each link, in the frame of the link."""
+    """Return the unit velocities of the joint of each link, in the frame of the link."""
     return [
         [PathTwist(link.v.start + k, t, n) for k, (t, n) in enumerate(unit_motions(link, pose))]
         for link, pose in zip(tree.links, poses, strict=True)
     ]
 
 
-def _carry(tree: Tree, poses: list[LinkPose], own: list[list[PathTwist]]) -> list[list[PathTwist]]:
-    """Return for each link the twists of all joints on its path, in the frame of the link."""
+def _path_twists(
+    tree: Tree, poses: list[LinkPose], own: list[list[PathTwist]]
+) -> list[list[PathTwist]]:
+    """Return for each link the twists of all joints on its path, in the frame of the link.
+
+    `own` are the twists of the joint of each link.
+    """
     outer: list[list[PathTwist]] = []
     inner: list[list[PathTwist]] = []
     result: list[list[PathTwist]] = []
@@ -277,7 +317,10 @@ def inertial_regressor(tree: Tree, poses: list[LinkPose], motions: list[Accelera
 
 
 def _work_of_units(tree: Tree, poses: list[LinkPose], units: list[list[Unit]]) -> list[SX]:
-    """Return for each link the power (nv, 10) of its unit wrenches along unit joint velocities."""
+    """Return the power (nv, 10) of ten unit wrenches of each link along unit joint velocities.
+
+    `units` are the wrenches of each link, one per inertial parameter.
+    """
     links: list[Elements] = [
         {twist.row: partial(element, twist, own) for twist in twists}
         for own, twists in zip(units, path_twists(tree, poses), strict=True)
@@ -286,7 +329,13 @@ def _work_of_units(tree: Tree, poses: list[LinkPose], units: list[list[Unit]]) -
 
 
 def unit_wrenches(motion: Acceleration) -> list[Unit]:
-    """Return the ten inertial wrenches of a link with one unit parameter and zero others."""
+    """Return the inertial wrenches of a link for a unit value of each of its ten parameters.
+
+    They are about the origin and in axes of the link frame.
+
+    Args:
+        motion: motion of the link.
+    """
     w, wd, vd, U = motion.w, motion.wd, motion.vd, motion.rate.U
     xy, xz, yz = w[0] * w[1], w[0] * w[2], w[1] * w[2]
     x_spread, y_spread, z_spread = motion.rate.spread
@@ -303,21 +352,36 @@ def unit_wrenches(motion: Acceleration) -> list[Unit]:
 
 
 def axis(k: int) -> SX:
-    """(3, 1) unit vector of a coordinate axis."""
+    """Return the unit vector (3, 1) of the coordinate axis 0, 1 or 2.
+
+    Args:
+        k: index of the axis.
+    """
     result = zeros()
     result[k] = 1
     return result
 
 
 def work(twist: PathTwist, unit: Unit) -> SX:
-    """Return the power of a wrench along a velocity, both about and in the same frame."""
+    """Return the power of a wrench along a velocity, both about the same point in the same axes.
+
+    Args:
+        twist: velocity.
+        unit: force and moment; None for zero.
+    """
     f, m = unit
     turning = SX(0) if m is None else SX(casadi.dot(twist.n, m))
     return turning if f is None else turning + casadi.dot(twist.t, f)
 
 
 def element(twist: PathTwist, units: list[Unit], k: int) -> SX:
-    """Return the power of the unit wrench of parameter k along a velocity."""
+    """Return the power of the unit wrench of parameter k along a velocity.
+
+    Args:
+        twist: velocity.
+        units: wrench for a unit value of each parameter, about the same point in the same axes.
+        k: index of the parameter, 0 to 9.
+    """
     return work(twist, units[k])
 
 
@@ -327,7 +391,9 @@ def element(twist: PathTwist, units: list[Unit], k: int) -> SX:
 
 
 def inertial_energy(tree: Tree, poses: list[LinkPose], velocities: list[Velocity]) -> list[SX]:
-    """Return the row (1, 10) of each link; its product with the parameters is the energy E + U.
+    """Return the row (1, 10) of each link whose product with its parameters is its energy [J].
+
+    It is the kinetic and potential energy.
 
     Args:
         tree: links of the tree.
@@ -347,12 +413,12 @@ def inertial_energy(tree: Tree, poses: list[LinkPose], velocities: list[Velocity
 
 
 def unit_energies(velocity: Velocity, up: SX, height: SX) -> list[SX]:
-    """Return the ten energies of a link with one unit parameter and zero others.
+    """Return the energies of a link for a unit value of each of its ten parameters.
 
     Args:
-        velocity: velocity of the link.
-        up: (3, 1) minus gravity, in the frame of the link.
-        height: potential energy of a unit mass at the origin of the frame.
+        velocity: velocity of the link, in its frame.
+        up: (3, 1) minus gravity, in the frame of the link [m/s^2].
+        height: potential energy of a unit mass at the origin of the frame [J/kg].
     """
     V, w = velocity.V, velocity.w
     x, y, z = w[0], w[1], w[2]
@@ -370,7 +436,9 @@ def unit_energies(velocity: Velocity, up: SX, height: SX) -> list[SX]:
 
 
 def momentum_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Velocity]) -> list[SX]:
-    """Return D1 (nv, 10) of each link: derivative of its kinetic energy by v, per unit parameter.
+    """Return D1 (nv, 10) of each link: joint momenta per unit inertial parameter.
+
+    Joint momenta are the derivatives of the kinetic energy by v.
 
     Args:
         tree: links of the tree.
@@ -381,7 +449,9 @@ def momentum_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Veloc
 
 
 def position_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Velocity]) -> list[SX]:
-    """Return D2 (nv, 10) of each link: minus derivative of E - U by positions, per unit parameter.
+    """Return D2 (nv, 10) of each link, per unit inertial parameter.
+
+    It is minus the derivative of kinetic minus potential energy by positions.
 
     Args:
         tree: links of the tree.
@@ -404,9 +474,10 @@ def position_regressor(tree: Tree, poses: list[LinkPose], velocities: list[Veloc
 
 
 def _level_rows(tree: Tree, paths: list[list[PathTwist]], ups: list[SX]) -> set[int]:
-    """Return indices in v of velocities without gravity effort.
+    """Return the indices in v of velocities without gravity effort.
 
-    They belong to vertical rotation axes and horizontal translations.
+    They belong to vertical rotation axes and horizontal translations. `paths` are the unit
+    velocities on the path of each link, `ups` minus gravity in its frame.
     """
     own = [
         (twist, ups[j])
@@ -418,7 +489,11 @@ def _level_rows(tree: Tree, paths: list[list[PathTwist]], ups: list[SX]) -> set[
 
 
 def unit_momenta(velocity: Velocity) -> list[Unit]:
-    """Return the ten momenta of a link with one unit parameter and zero others."""
+    """Return the (linear, angular) momenta of a link for a unit value of each parameter.
+
+    Args:
+        velocity: velocity of the link, in its frame.
+    """
     V, w = velocity.V, velocity.w
     turning = (
         (w[0], 0, 0),
@@ -434,9 +509,10 @@ def unit_momenta(velocity: Velocity) -> list[Unit]:
 
 
 def unit_lifts(up: SX) -> list[Unit]:
-    """Return the ten wrenches that hold a link with one unit parameter against gravity.
+    """Return the wrenches that hold a link against gravity, for a unit value of each parameter.
 
-    `up`, (3, 1), is minus gravity in the frame of the link.
+    Args:
+        up: (3, 1) minus gravity, in the frame of the link [m/s^2].
     """
     nothing: Unit = (None, None)
     return [nothing] * 6 + [(None, cross(axis(k), up)) for k in range(3)] + [(up, None)]
@@ -445,7 +521,7 @@ def unit_lifts(up: SX) -> list[Unit]:
 def _element(
     twist: PathTwist | None, rate: PathTwist, lifts: list[Unit], units: list[Unit], k: int
 ) -> SX:
-    """Return an element of the regressor for the inertial parameter of index k.
+    """Return an element of the position regressor D2 for the inertial parameter of index k.
 
     Args:
         twist: motion along which `lifts` does work; None without gravity effort.

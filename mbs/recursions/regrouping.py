@@ -40,17 +40,17 @@ def regroup(tree: Tree, poses: list[LinkPose], bodies: list[Body]) -> list[Body]
         link = tree.links[j]
         if link.motion is Motion.FREE:
             continue
-        bodies[j], moved = _parts(link.motion, bodies[j])
+        bodies[j], moved = _split_body(link.motion, bodies[j])
         if link.antecedent >= 0:
-            part = _seen_through(moved, link.motion, poses[j])
+            part = _in_antecedent(moved, link.motion, poses[j])
             bodies[link.antecedent] = _join(bodies[link.antecedent], part)
     return bodies
 
 
-def _parts(motion: Motion, body: Body) -> tuple[Body, Body]:
-    """Split a body of link j into the part that stays and the part regrouped to its antecedent.
+def _split_body(motion: Motion, body: Body) -> tuple[Body, Body]:
+    """Split a body of link j into the part that stays and the part that is moved to its antecedent.
 
-    Both are in frame j.
+    Both are in frame j. `motion` is the type of joint j.
     """
     match motion:
         case Motion.REVOLUTE:
@@ -60,8 +60,8 @@ def _parts(motion: Motion, body: Body) -> tuple[Body, Body]:
     return body.massive()
 
 
-def _seen_through(body: Body, motion: Motion, pose: LinkPose) -> Body:
-    """Transform a regrouped part from frame j to frame i.
+def _in_antecedent(body: Body, motion: Motion, pose: LinkPose) -> Body:
+    """Transform the moved part of a body from frame j to frame i of its antecedent.
 
     For a prismatic joint the part is a rotational inertia, which only needs a rotation.
     """
@@ -76,19 +76,19 @@ def _seen_through(body: Body, motion: Motion, pose: LinkPose) -> Body:
 
 
 def _join(body: Body, part: Body) -> Body:
-    """Sum of two bodies about the same point; cancelling numbers become exact zeros."""
+    """Return the sum of two bodies about the same point; numbers that cancel become exact zeros."""
     both = zip(_moments(body), _moments(part), strict=True)
     return type(body)(*(_sum(a, b) for a, b in both))
 
 
 def _sum(a: SX, b: SX) -> SX:
-    """Return a + b; numbers that cancel become structural zeros."""
+    """Return a + b for matrices of equal shape; numbers that cancel become exact zeros."""
     entries = (exact_sum(x, y) for x, y in zip(elements(a), elements(b), strict=True))
     return casadi.reshape(casadi.vertcat(*entries), *a.shape)
 
 
 def _moments(body: Body) -> tuple[SX, SX, SX]:
-    """Return the moments of a body of order 2, 1 and 0."""
+    """Return the three moments of a body: of order 2 (J or S), order 1 (ms) and order 0 (m)."""
     return body.J if isinstance(body, Inertia) else body.S, body.ms, body.m
 
 
@@ -105,7 +105,9 @@ def _moments(body: Body) -> tuple[SX, SX, SX]:
 def shift_frames(
     tree: Tree, poses: list[LinkPose], bodies: list[Body], *, base_rests: bool = True
 ) -> tuple[list[LinkPose], list[Body]]:
-    """Return poses and bodies after shifting frames of revolute links along their axes.
+    """Return poses and bodies after frames of revolute links were shifted along their axes.
+
+    Shifts make distances zero, which saves operations.
 
     Args:
         tree: links of the tree.
@@ -113,14 +115,14 @@ def shift_frames(
         bodies: inertia of each link, about and in its frame.
         base_rests: whether the base does not move.
     """
-    rise = _rises(tree, poses, base_rests)
+    rise = _frame_shifts(tree, poses, base_rests)
     if all(up.is_zero() for up in rise):
         return poses, bodies
-    moved = [_between(tree, poses, rise, j) for j in range(len(poses))]
+    moved = [_shifted_pose(tree, poses, rise, j) for j in range(len(poses))]
     return moved, [body.shift(2, -rise[j]) for j, body in enumerate(bodies)]
 
 
-def _rises(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
+def _frame_shifts(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
     """Return the shift [m] of each link frame along its joint axis that saves operations.
 
     Args:
@@ -128,7 +130,7 @@ def _rises(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
         poses: pose of each link relative to its antecedent.
         base_rests: whether the base does not rotate.
     """
-    resting = _resting(tree, poses) if base_rests else set()
+    resting = _fixed_origins(tree, poses) if base_rests else set()
     rise = [SX(0)] * len(poses)
     for j in reversed(range(len(poses))):
         if tree.links[j].motion is not Motion.REVOLUTE:
@@ -142,7 +144,7 @@ def _rises(tree: Tree, poses: list[LinkPose], base_rests: bool) -> list[SX]:
     return rise
 
 
-def _resting(tree: Tree, poses: list[LinkPose]) -> set[int]:
+def _fixed_origins(tree: Tree, poses: list[LinkPose]) -> set[int]:
     """Return indices of links whose joint axis has a fixed origin in the base."""
     found: set[int] = set()
     for j, link in enumerate(tree.links):
@@ -157,8 +159,11 @@ def _resting(tree: Tree, poses: list[LinkPose]) -> set[int]:
     return found
 
 
-def _between(tree: Tree, poses: list[LinkPose], rise: list[SX], j: int) -> LinkPose:
-    """Pose of link j relative to its antecedent after both frames have been shifted."""
+def _shifted_pose(tree: Tree, poses: list[LinkPose], rise: list[SX], j: int) -> LinkPose:
+    """Return the pose of link j relative to its antecedent after both frames were shifted.
+
+    `rise` is the shift of each link frame along its joint axis [m].
+    """
     pose, i = poses[j], tree.links[j].antecedent
     b = -rise[i] if i >= 0 else SX(0)
     screw = pose.motion[0]

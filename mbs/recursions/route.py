@@ -52,7 +52,12 @@ def cost(value: SX, q: SX, p: SX) -> int:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RotationAboutZ:
-    """Rotation about z by an angle [rad]; `backwards` if the path passes it in reverse."""
+    """Rotation about z by an angle [rad].
+
+    Attributes:
+        angle: angle [rad].
+        backwards: whether the path passes the rotation in reverse.
+    """
 
     angle: SX
     backwards: bool = False
@@ -60,7 +65,7 @@ class RotationAboutZ:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OtherRotation:
-    """Rotation about another axis, or by a matrix."""
+    """Rotation on a path about another axis than z, or by a matrix."""
 
     rotation: Rotation
 
@@ -74,9 +79,12 @@ class PathTranslation:
 
 @dataclass(frozen=True, slots=True)
 class JointAt:
-    """Marker of joint k on a path: a point on its z axis, or axes in which its motion is constant.
+    """Marker of a joint on a path: a point on its axis, or axes in which its motion is constant.
 
     The second case is for joints with several velocities.
+
+    Attributes:
+        link: index of the link of the joint.
     """
 
     link: int
@@ -84,7 +92,11 @@ class JointAt:
 
 @dataclass(frozen=True, slots=True)
 class OriginOf:
-    """Marker of the origin of frame k on a path, -1 for the base."""
+    """Marker of the origin of a link frame on a path.
+
+    Attributes:
+        link: index of the link, -1 for the base.
+    """
 
     link: int
 
@@ -133,7 +145,7 @@ def _link_steps(k: int, link: Link, q: SX) -> list[PathStep]:
 
 
 def _seat_steps(frame: Khalil) -> list[PathStep]:
-    """Steps from a frame to the axis of the next joint, by Khalil's parameters."""
+    """Return the steps from a frame to the axis of the next joint: gamma, b, alpha and d."""
     return [
         RotationAboutZ(frame.gamma),
         PathTranslation(vector([0, 0, frame.b])),
@@ -143,7 +155,7 @@ def _seat_steps(frame: Khalil) -> list[PathStep]:
 
 
 def _fixed_steps(frame: Khalil) -> list[PathStep]:
-    """Steps from a frame to the next frame of the same link, by Khalil's parameters."""
+    """Return the steps of all six Khalil parameters from a frame to the next frame of a link."""
     return [
         *_seat_steps(frame),
         RotationAboutZ(frame.theta),
@@ -152,7 +164,7 @@ def _fixed_steps(frame: Khalil) -> list[PathStep]:
 
 
 def _is_idle(step: PathStep) -> bool:
-    """Whether a step is the identity."""
+    """Return whether a step is the constant identity; False for markers."""
     match step:
         case RotationAboutZ(angle=angle):
             return bool(angle.is_zero())
@@ -164,12 +176,16 @@ def _is_idle(step: PathStep) -> bool:
 
 
 def reverse_path(steps: Iterable[PathStep]) -> list[PathStep]:
-    """Return the path in reverse, from its end to its beginning."""
+    """Return the same path from its end to its beginning.
+
+    Args:
+        steps: steps of a path.
+    """
     return [_inverse(step) for step in reversed(list(steps))]
 
 
 def _inverse(step: PathStep) -> PathStep:
-    """Return a step in the opposite direction."""
+    """Return the step of the path in the opposite direction; markers are unchanged."""
     match step:
         case RotationAboutZ(angle=angle, backwards=backwards):
             return RotationAboutZ(angle, not backwards)
@@ -181,7 +197,7 @@ def _inverse(step: PathStep) -> PathStep:
 
 
 def inverse_rotation(rotation: Rotation) -> Rotation:
-    """Return the inverse rotation."""
+    """Return the inverse of a rotation."""
     if isinstance(rotation, AxisRotation):
         return AxisRotation(rotation.axis, -rotation.s, rotation.c)
     return MatrixRotation(rotation.matrix.T)
@@ -206,8 +222,8 @@ def join_rotations(steps: Sequence[PathStep], tree: Tree) -> list[PathStep]:
             case RotationAboutZ():
                 rotations.append(step)
             case PathTranslation(p=p):
-                result.append(PathTranslation(_total(rotations).apply(p)))
-            case JointAt(link=k) if _along_z(tree.links[k]):
+                result.append(PathTranslation(_product_of_rotations(rotations).apply(p)))
+            case JointAt(link=k) if tree.links[k].motion in (Motion.REVOLUTE, Motion.PRISMATIC):
                 result.append(step)
             case OriginOf():
                 result.append(step)
@@ -217,18 +233,16 @@ def join_rotations(steps: Sequence[PathStep], tree: Tree) -> list[PathStep]:
     return result + _one_rotation(rotations)
 
 
-def _along_z(link: Link) -> bool:
-    """Whether the joint of a link moves about or along its z axis."""
-    return link.motion in (Motion.REVOLUTE, Motion.PRISMATIC)
-
-
 def _one_rotation(rotations: list[RotationAboutZ]) -> list[PathStep]:
-    """Return successive rotations about z as one step; [] if there are none."""
-    return [OtherRotation(_total(rotations))] if rotations else []
+    """Return successive rotations about z as a list of one step; empty if there are none."""
+    return [OtherRotation(_product_of_rotations(rotations))] if rotations else []
 
 
-def _total(rotations: list[RotationAboutZ]) -> AxisRotation:
-    """Join rotations about parallel z axes. Angles are added in the order of the tree."""
+def _product_of_rotations(rotations: list[RotationAboutZ]) -> AxisRotation:
+    """Return the product of rotations about parallel z axes, by the sum of their angles.
+
+    Angles are added in the order of the tree.
+    """
     forward, backward = (
         [rotation.angle for rotation in rotations if rotation.backwards is backwards]
         for backwards in (False, True)
@@ -241,7 +255,7 @@ def _total(rotations: list[RotationAboutZ]) -> AxisRotation:
 
 
 def _sum(angles: list[SX]) -> SX:
-    """Return the sum of expressions, added from first to last."""
+    """Return the sum of expressions, added from first to last; 0 without expressions."""
     total = SX(0)
     for angle in angles:
         total = total + angle
@@ -251,7 +265,17 @@ def _sum(angles: list[SX]) -> SX:
 def path_between(
     tree: Tree, q: SX, a: tuple[int, Pose], b: tuple[int, Pose]
 ) -> tuple[list[PathStep], list[PathStep]]:
-    """Return the path from frame a back to the last common link, and from there to frame b."""
+    """Return the path from frame a to frame b in two parts, which meet at the last common link.
+
+    Args:
+        tree: links of the tree.
+        q: (nq, 1) positions.
+        a: index of the link (-1 for the base) and pose of frame a in the link.
+        b: index of the link (-1 for the base) and pose of frame b in the link.
+
+    Returns:
+        steps from a to the frame of the last common link, and steps from there to b.
+    """
     to_a, to_b = path_to(tree, q, a), path_to(tree, q, b)
     fork = OriginOf(common_link(tree, a[0], b[0]))
     return reverse_path(to_a[to_a.index(fork) + 1 :]), to_b[to_b.index(fork) + 1 :]
@@ -289,9 +313,14 @@ def relative_pose(
 
 
 def cheapest_pose(tree: Tree, q: SX, p: SX, a: tuple[int, Pose], b: tuple[int, Pose]) -> Pose:
-    """Return `relative_pose` with the multiplication order that needs fewer operations.
+    """Return the pose of frame b relative to frame a, in the cheaper of two multiplication orders.
 
-    p are the parameters, operations on which are free.
+    Args:
+        tree: links of the tree.
+        q: (nq, 1) positions.
+        p: (np, 1) parameters; operations on them alone are free.
+        a: index of the link (-1 for the base) and pose of frame a in the link.
+        b: index of the link (-1 for the base) and pose of frame b in the link.
     """
     both = [relative_pose(tree, q, a, b, outwards=outwards) for outwards in (False, True)]
     return min(both, key=lambda pose: cost(pose.matrix, q, p))
@@ -300,7 +329,15 @@ def cheapest_pose(tree: Tree, q: SX, p: SX, a: tuple[int, Pose], b: tuple[int, P
 def express(
     tree: Tree, q: SX, axes: tuple[int, Pose], frame: tuple[int, Pose], vectors: Iterable[SX]
 ) -> list[SX]:
-    """Express vectors (3, 1) of `frame` in the axes of the frame `axes`."""
+    """Express vectors of one frame in the axes of another frame.
+
+    Args:
+        tree: links of the tree.
+        q: (nq, 1) positions.
+        axes: frame of the new axes: index of the link (-1 for the base) and pose in the link.
+        frame: frame of the present axes, in the same form.
+        vectors: vectors (3, 1) in axes of `frame`.
+    """
     back, out = path_between(tree, q, axes, frame)
     turned = list(vectors)
     for step in reversed(join_rotations([*back, *out], tree)):
@@ -310,13 +347,24 @@ def express(
 
 
 def common_link(tree: Tree, a: int, b: int) -> int:
-    """Return the last link on the paths to both links a and b, -1 for the base."""
+    """Return the last link on the paths to both links a and b, -1 for the base.
+
+    Args:
+        tree: the links.
+        a: index of a link, -1 for the base.
+        b: index of a link, -1 for the base.
+    """
     shared = [k for k, m in zip(tree.path(a), tree.path(b), strict=False) if k == m]
     return shared[-1] if shared else -1
 
 
 def along(rotation: Rotation, vectors: Iterable[SX]) -> list[SX]:
-    """Rotate vectors from the rotated frame to the fixed frame; zero vectors are not changed."""
+    """Rotate vectors (3, 1) from the rotated frame to the fixed frame; zeros are not changed.
+
+    Args:
+        rotation: rotation from the rotated frame to the fixed frame.
+        vectors: vectors in axes of the rotated frame.
+    """
     return [v if is_zero(v) else casadi.densify(rotation.apply(v)) for v in vectors]
 
 
@@ -364,7 +412,12 @@ def relative_motion(
 
 
 def frame_velocity(frame: Frame, moving: list[Velocity]) -> tuple[SX, SX]:
-    """Return the linear and angular velocity of a frame, in its own axes."""
+    """Return the linear [m/s] and angular velocity [rad/s] of a frame (3, 1), in its own axes.
+
+    Args:
+        frame: index of the link (-1 for the base) and pose of the frame in the link.
+        moving: velocity of each link, in its frame.
+    """
     link, pose = frame
     if link < 0:
         return zeros(), zeros()
@@ -394,7 +447,11 @@ def relative_acceleration(
 
 
 def _acceleration(frame: Frame, motions: list[Acceleration]) -> tuple[SX, SX, SX]:
-    """Return the origin acceleration, angular velocity and angular acceleration of a frame."""
+    """Return the origin acceleration, angular velocity and angular acceleration of a frame.
+
+    They are (3, 1) each, in its own axes; zero for a frame on the base. `motions` are those of the
+    links.
+    """
     link, pose = frame
     if link < 0:
         return zeros(), zeros(), zeros()

@@ -41,7 +41,7 @@ random positions the values of a matrix that is not always singular are much lar
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SquareJacobian:
-    """Square matrix X B, where X is a product of rotations and a shear.
+    """Square matrix X B; B is block triangular and X is a product of rotations and a shear.
 
     Attributes:
         B: (m, m) block triangular matrix, up to permutations, with structural zeros.
@@ -56,22 +56,28 @@ class SquareJacobian:
     sign: int
 
     def inverse(self) -> SX:
-        """(m, m) inverse of the matrix, by block substitution."""
+        """Return the inverse (m, m) of the matrix, by block substitution.
+
+        It must not be always singular.
+        """
         assert self.blocks is not None
         return solve_blocks(self.B, self.blocks, self.X_inverse)
 
     def seen(self, twist: SX) -> SX:
-        """(m, 1) transform of a right-hand side to the equations of B: X^-1 twist."""
+        """Return X^-1 twist (m, 1), which is the right-hand side of equations with B.
+
+        `twist` (m, 1) is the right-hand side of equations with X B.
+        """
         return casadi.densify(casadi.mtimes(self.X_inverse, twist))
 
     def determinants(self) -> list[SX]:
-        """Determinants of the blocks; a single zero for an always singular matrix."""
+        """Return the determinants of the blocks; a single zero for an always singular matrix."""
         if self.blocks is None:
             return [SX(0)]
         return [determinant(block.of(self.B)) for block in self.blocks]
 
     def determinant(self) -> SX:
-        """Determinant of the matrix."""
+        """Return the determinant of the matrix: sign times the product of block determinants."""
         product = SX(self.sign)
         for factor in self.determinants():
             product = product * factor
@@ -99,7 +105,7 @@ class _View:
     blocks: tuple[Block, ...] | None
 
     def rank(self, size: int) -> tuple[float, ...]:
-        """Sort key, lower is better: block work, numbers of varying entries, distance from middle.
+        """Return a sort key, lower is better: block work, then varying entries.
 
         `size` is the number of frames of the survey; axes in the middle of the path are preferred.
         """
@@ -126,7 +132,7 @@ def square_jacobian(
     tree, q = target.tree, target.q
     found = survey(target)
     if G is None:
-        places = _places(tree, found, columns)
+        places = _frame_indices(tree, found, columns)
     else:
         found = found.combine(_values(target, G))
         places = [*spread(found.on_path), len(found.frames) - 1]
@@ -139,7 +145,7 @@ def square_jacobian(
     w = cheapest_jacobian(target.along(j))[[3 + k for k in view.w_rows], :]
     J = casadi.vertcat(V, w)
     J = J if G is None else casadi.mtimes(J, G)
-    X_inverse = _back(
+    X_inverse = _inverse_map(
         rows,
         relative_pose(tree, q, i, target.axes).R[list(view.V_rows), :],
         relative_pose(tree, q, j, target.axes).R[list(view.w_rows), :],
@@ -152,14 +158,21 @@ def square_jacobian(
 
 
 def _values(target: VelocityTarget, A: SX) -> Array:
-    """(samples, ...) numeric values of a matrix at the random configurations of a survey."""
+    """Return the values (samples, ...) of the matrix A at random configurations.
+
+    `target` has the symbols of A. The configurations are those of `random_samples`.
+    """
     f = Function("f", [target.q, target.p], [casadi.densify(A)])
     samples = random_samples(target.tree, target.p.numel())
     return np.array([np.array(f(*sample)) for sample in samples])
 
 
-def _places(tree: Tree, found: JacobianSamples, columns: Sequence[int]) -> list[int]:
-    """Indices in the survey of the base, the links of these columns, and the required axes."""
+def _frame_indices(tree: Tree, found: JacobianSamples, columns: Sequence[int]) -> list[int]:
+    """Return the indices in `found.frames` of the frames whose axes and origins are tried.
+
+    These are the base, the links on the path that the velocities `columns` move, and the required
+    axes.
+    """
     kept = []
     for place in found.on_path:
         link, _ = found.frames[place]
@@ -169,8 +182,10 @@ def _places(tree: Tree, found: JacobianSamples, columns: Sequence[int]) -> list[
     return [*kept, len(found.frames) - 1]
 
 
-def _back(rows: Sequence[int], R_V: SX, R_w: SX, arm: SX) -> SX:
-    """Return X^-1, which maps the required rows of [V; w] to the rows of a view.
+def _inverse_map(rows: Sequence[int], R_V: SX, R_w: SX, arm: SX) -> SX:
+    """Return X^-1, which maps the required rows of [V; w] to rows in other axes.
+
+    The other axes and their reference point are those of a `_View`.
 
     Args:
         rows: required rows.
@@ -191,7 +206,12 @@ def _back(rows: Sequence[int], R_V: SX, R_w: SX, arm: SX) -> SX:
 def _sign(
     B: SX, values: Array, blocks: tuple[Block, ...] | None, X_inverse: SX, whole: Array
 ) -> SquareJacobian:
-    """Return the square Jacobian with the sign of its determinant relative to its blocks."""
+    """Return the square Jacobian, with the sign of its determinant relative to that of its blocks.
+
+    It is the sign of the determinant of the whole matrix, divided by the product of those of the
+    `blocks` of `B`. `values` and `whole` (samples, m, m) are numeric values of `B` and of the whole
+    matrix. `X_inverse` is stored in the result.
+    """
     if blocks is None or _always_singular(values):
         return SquareJacobian(B, None, X_inverse, 1)
     parts = [np.linalg.det(values[0][np.ix_(block.rows, block.columns)]) for block in blocks]
@@ -200,7 +220,7 @@ def _sign(
 
 
 def _always_singular(values: Array) -> bool:
-    """Whether the matrices (samples, n, n) are singular at all samples."""
+    """Return whether the matrices (samples, n, n) are singular at all samples."""
     singular = np.linalg.svd(values, compute_uv=False)
     return bool((singular[:, -1] < _SINGULAR * singular[:, 0]).all())
 
@@ -208,7 +228,11 @@ def _always_singular(values: Array) -> bool:
 def _views(
     found: JacobianSamples, places: Sequence[int], rows: Sequence[int], columns: Sequence[int]
 ) -> Iterator[_View]:
-    """Yield the views in which the selected rows do not mix with other rows of [V; w]."""
+    """Yield candidates of axes and reference point for selected rows and columns of the Jacobian.
+
+    In these axes the selected `rows` do not mix with other rows of [V; w]. `places` are the frames
+    to try, as indices in `found.frames`.
+    """
     V_rows, w_rows = [k for k in rows if k < 3], [k - 3 for k in rows if k >= 3]
     memo: dict[bytes, tuple[Block, ...] | None] = {}
     references = [None, *(k for k in found.separate_origins() if k in places)]
@@ -218,7 +242,7 @@ def _views(
         if w_kept is None:
             continue
         for r in references:
-            if _leaks(found.arm(r), R, w, V_rows, w_kept):
+            if _mixes_rows(found.arm(r), R, w, V_rows, w_kept):
                 continue
             for i in places:
                 V_kept = _rows_reached(found.orientation(i), V_rows)
@@ -234,20 +258,29 @@ def _views(
 
 
 def _rows_reached(R: Array, rows: Sequence[int]) -> tuple[int, ...] | None:
-    """Components in rotated axes that the rows depend on; None if their number differs."""
+    """Return the components, in rotated axes, on which `rows` depend; None if their number differs.
+
+    `R` is (samples, 3, 3).
+    """
     kept = np.flatnonzero(nonzero(R[:, list(rows)]).any(axis=0))
     return tuple(kept.tolist()) if len(kept) == len(rows) else None
 
 
-def _leaks(arm: Array, R: Array, w: Array, V_rows: Sequence[int], w_kept: Sequence[int]) -> bool:
-    """Whether a change of reference adds angular velocities outside the selection to V rows."""
+def _mixes_rows(
+    arm: Array, R: Array, w: Array, V_rows: Sequence[int], w_kept: Sequence[int]
+) -> bool:
+    """Return whether a change of reference adds angular velocities outside the selection to V rows.
+
+    `arm` (samples, 3) is the vector from the new reference, `R` (samples, 3, 3) the orientation of
+    the axes of w, and `w_kept` are the selected components.
+    """
     rest = [k for k in range(3) if k not in w_kept]
     share = np.cross(np.swapaxes(R[:, :, rest] @ w[:, rest], 1, 2), arm[:, None])
     return bool(nonzero(share[:, :, list(V_rows)]).any())
 
 
 def _with_zeros(A: SX, pattern: NDArray[np.bool_]) -> SX:
-    """Return A with exact zeros outside the nonzero `pattern`."""
+    """Return the matrix A with exact zeros where `pattern` is False."""
     exact = casadi.densify(SX(A))
     for row, column in np.argwhere(~pattern).tolist():
         exact[row, column] = SX(0)

@@ -61,7 +61,10 @@ _CROWDED = (14, 15)
 
 
 def _source(equations: Equations) -> str | None:
-    """Return the C code of the functions of an integration; None if they must be interpreted."""
+    """Return the C code of the functions of an integration; None if they must be interpreted.
+
+    They must if they call machine code, or if an operation has no C code.
+    """
     if calls_machine_code(equations.all):
         return None
     source = exact_source(equations.all)
@@ -75,7 +78,7 @@ with gcc 12 for 600 to 40,000 instructions, accurate to a factor of two."""
 
 @dataclass(slots=True, eq=False)
 class IntegrationCode:
-    """Functions of an integration; they are compiled once interpretation has cost as much time.
+    """Functions of an integration, compiled as soon as interpretation has cost as much time.
 
     Interpreted and compiled functions are bit-identical. The total time is therefore at most twice
     that of the faster method. Machine code in the cache is used as soon as interpretation has cost
@@ -107,11 +110,11 @@ class IntegrationCode:
         self.instructions = sum(g.n_instructions() for g in counted)
 
     def is_worth(self, further: float, cost: tuple[float, float]) -> bool:
-        """Return whether interpreted runs have taken longer than some work would take.
+        """Return whether interpreted runs have taken longer than some other work would take.
 
         Args:
-            further: time of the present run [s].
-            cost: time of the work: constant part, and part per instruction [s].
+            further: time of the present run [s], in addition to `spent`.
+            cost: time of the other work: constant part [s], and part per instruction [s].
         """
         return self.spent + further > cost[0] + cost[1] * self.instructions
 
@@ -119,7 +122,7 @@ class IntegrationCode:
         """Compile the functions if that is worth its time. Return whether they are compiled.
 
         Args:
-            further: time of the present run [s].
+            further: time of the present run [s]. By default the functions are compiled at once.
 
         Raises:
             CompilerError: the compiler rejects the code.
@@ -143,14 +146,18 @@ class IntegrationCode:
 
     @staticmethod
     def _build(source: str) -> tuple[dict[str, str], tuple[str, ...]]:
+        """Return the files (name to text) and the compiler flags of a C source."""
         return {"system.c": source}, flags_for(source)
 
     def evaluations(self) -> tuple[Any, ...]:
-        """Return evaluations in the order of `driver_model` in driver.h; None if missing."""
+        """Return the functions in the form that the run-time library calls, None for missing ones.
+
+        They are compiled or interpreted, in the order of `_in_order`.
+        """
         library = self.library
         if library is None:
             return tuple(
-                None if function is None else interpreted_evaluation(function, _examine)
+                None if function is None else interpreted_evaluation(function, _raise_fatal)
                 for function in self._in_order()
             )
         if not self.machine_code:
@@ -163,7 +170,11 @@ class IntegrationCode:
         )
 
     def _in_order(self) -> tuple[casadi.Function | None, ...]:
-        """Return the functions in the order of `driver_model` in driver.h."""
+        """Return the functions in the order of `driver_model` in driver.h, None for missing ones.
+
+        The order is: rhs, project, jacobian, indicators, rates, jump, approaches, and rows, forces
+        and regularity of the `Passage`.
+        """
         own, through = self.equations, self.equations.passage
         last = (
             (None,) * 3 if through is None else (through.rows, through.forces, through.regularity)
@@ -175,34 +186,46 @@ class IntegrationCode:
 # Evaluations for the run-time library, and the integration.
 
 
-def _examine(error: BaseException) -> None:
-    """Return if an evaluation has no value; raise if its error must stop the integration."""
+def _raise_fatal(error: BaseException) -> None:
+    """Raise the error of an evaluation if it must stop the integration; else return.
+
+    A RuntimeError only means that the evaluation has no value there.
+    """
     if not isinstance(error, RuntimeError):
         raise error
     failure_of(error, "rhs")
 
 
-def _passage(through: Passage | None) -> tuple[Any, ...] | None:
-    """Return sizes, sparsity patterns and typical regularity for the run-time library."""
+def _passage_data(through: Passage | None) -> tuple[Any, ...] | None:
+    """Return the data of a `Passage` that the run-time library needs; None without a passage.
+
+    They are its sizes, the sparsity patterns of its matrices, and its typical regularity.
+    """
     if through is None:
         return None
     matrices = [(through.rows, number) for number in (1, 2, 5)] + [(through.forces, 0)]
-    patterns = tuple(_places(function.sparsity_out(number)) for function, number in matrices)
+    patterns = tuple(
+        _sparsity_arrays(function.sparsity_out(number)) for function, number in matrices
+    )
     return (tuple(through.size), patterns, through.typical)
 
 
-def _places(pattern: casadi.Sparsity) -> npt.NDArray[np.intc] | None:
-    """Return the compressed columns of a sparse matrix (`passage_patterns`); None if dense."""
+def _sparsity_arrays(pattern: casadi.Sparsity) -> npt.NDArray[np.intc] | None:
+    """Return column offsets and row indices of a sparse matrix (`passage_patterns`).
+
+    None if dense.
+    """
     if pattern.is_dense():
         return None
     return np.array([*pattern.colind(), *pattern.row()], dtype=np.intc)
 
 
 def _integration(given: IntegrationProblem, code: IntegrationCode) -> Any:
-    """Return an integration object of the run-time library, at the first time.
+    """Return an integration object of the run-time library, at the first time of the problem.
 
-    Raises:
-        SolverError: no memory is left.
+    Args:
+        given: integration problem.
+        code: functions of the problem.
     """
     own, indicators = given.equations, given.equations.indicators
     sizes = len(given.x0), len(given.p), given.modes
@@ -211,7 +234,7 @@ def _integration(given: IntegrationProblem, code: IntegrationCode) -> Any:
         return core_library().integration(
             code.evaluations(),
             (*sizes, 0 if indicators is None else indicators.numel_out(0)),
-            _passage(own.passage),
+            _passage_data(own.passage),
             given.p,
             (given.rtol, given.atol, given.max_step, own.first_step),
             None if given.sizes is None else np.ascontiguousarray(given.sizes),
@@ -226,12 +249,15 @@ def _integration(given: IntegrationProblem, code: IntegrationCode) -> Any:
 def run_problem(
     given: IntegrationProblem, code: IntegrationCode, progress: Progress | None
 ) -> EventMotion:
-    """Integrate a problem; return the motion up to the last time that is reached.
+    """Integrate a problem up to its last time, or until an error or control-C stops it.
 
     Args:
         given: integration problem.
         code: functions of the problem.
         progress: callable that is called repeatedly with the present time [s].
+
+    Returns:
+        the motion up to the last time that is reached. Its `stop` is the error, or None.
 
     Raises:
         SolverError: no memory is left.
@@ -280,6 +306,7 @@ def _no_check() -> None:
 
 
 def _event(run: Any, given: IntegrationProblem) -> IntegrationEvent:
+    """Return the last event of an integration object `run` of the run-time library."""
     assert given.equations.indicators is not None
     fired, modes = np.empty(given.equations.indicators.numel_out(0)), np.empty(given.modes)
     run.event(fired, modes)

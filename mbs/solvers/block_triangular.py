@@ -35,7 +35,7 @@ class Block:
         return len(self.rows)
 
     def of(self, A: SX) -> SX:
-        """Return the block of a matrix, dense."""
+        """Return the block of the matrix A (n, n), dense (size, size)."""
         return casadi.densify(A[list(self.rows), list(self.columns)])
 
 
@@ -63,7 +63,10 @@ def block_triangular(pattern: NDArray[np.bool_]) -> tuple[Block, ...] | None:
 
 
 def _matching(pattern: NDArray[np.bool_]) -> list[int] | None:
-    """Match each column with a row in which it is non-zero, by augmenting paths."""
+    """Return for each column a row of its own in which it is non-zero, by augmenting paths.
+
+    None if no such matching exists.
+    """
     n = len(pattern)
     row_of = [-1] * n
     column_of = [-1] * n
@@ -76,7 +79,11 @@ def _matching(pattern: NDArray[np.bool_]) -> list[int] | None:
 def _augment(
     pattern: NDArray[np.bool_], start: int, row_of: list[int], column_of: list[int]
 ) -> bool:
-    """Match one more column, breadth first (without recursion); return whether that succeeds."""
+    """Match the column `start`, and rematch others if necessary; return whether that succeeds.
+
+    `row_of` and `column_of` are the matching by column and by row (-1 if unmatched), changed in
+    place. The search is breadth first, without recursion.
+    """
     reached: dict[int, int] = {}
     queue = [start]
     for column in queue:
@@ -96,7 +103,10 @@ def _augment(
 
 
 def _strong_parts(needs: Sequence[Sequence[int]]) -> list[list[int]]:
-    """Return the strongly connected components of a graph; needed components come first."""
+    """Return the strongly connected components of a graph, each as a list of its nodes.
+
+    needs[k] are the nodes that node k needs. Components come after the components that they need.
+    """
     n = len(needs)
     number, low, on_stack = [-1] * n, [0] * n, [False] * n
     stack: list[int] = []
@@ -136,7 +146,7 @@ part between blocks: twice the equations need four times the operations."""
 
 
 def solve_large(A: SX, B: SX) -> SX:
-    """Return the solution X of A X = B, block by block if there are many equations.
+    """Return the solution X (n, m) of A X = B, block by block if n is above 40.
 
     Args:
         A: (n, n) regular matrix.
@@ -153,7 +163,7 @@ def solve_large(A: SX, B: SX) -> SX:
 
 
 def solve_blocks(A: SX, blocks: Sequence[Block], B: SX) -> SX:
-    """Return the solution X of A X = B, block by block.
+    """Return the solution X (n, m) of A X = B, block by block.
 
     Args:
         A: (n, n) regular matrix in block triangular form.
@@ -173,7 +183,7 @@ def solve_blocks(A: SX, blocks: Sequence[Block], B: SX) -> SX:
 
 
 def determinant(A: SX) -> SX:
-    """Return the determinant of a small square matrix, without divisions up to seven rows.
+    """Return the determinant of a square matrix A, without divisions up to seven rows.
 
     Each minor of the first k rows is formed once, from the minors of the first k - 1 rows.
     """

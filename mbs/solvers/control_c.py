@@ -11,7 +11,7 @@ from types import FrameType
 
 @contextmanager
 def control_c() -> Iterator[Callable[[], None]]:
-    """Context manager that yields `check()`, which raises KeyboardInterrupt after control-C.
+    """Yield a callable `check()`, which raises KeyboardInterrupt if control-C was pressed.
 
     Python drops a KeyboardInterrupt that is raised in a finalizer, so call `check` regularly. An
     interrupted call of CasADi may return None. An error that is raised in the block after control-C

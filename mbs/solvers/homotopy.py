@@ -34,10 +34,9 @@ _MOST_STEPS = 4000
 def follow(
     newton: Newton, x: Complex, settle: Settle, tolerance: float = TOLERANCE
 ) -> tuple[Complex, Real]:
-    """Track roots from t = 0 to t = 1; return the roots (r, n) and the t (r,) that each reached.
+    """Track roots of equations from t = 0 to t = 1 by continuation.
 
-    t is 1, or less at a singular root or a root at infinity, where steps become too small. The
-    predictor is the fourth-order Runge-Kutta method. The corrector is two Newton steps.
+    The predictor is the fourth-order Runge-Kutta method. The corrector is two Newton steps.
 
     Args:
         newton: Newton step of the equations.
@@ -45,6 +44,10 @@ def follow(
         settle: normalisation after each step.
         tolerance: size of the first Newton correction that steps aim at; up to twice this size is
             accepted.
+
+    Returns:
+        roots (r, n), and the t (r,) that each reached: 1, or less at a singular root or a root at
+        infinity, where steps become too small.
     """
     t, h = np.zeros(len(x)), np.full(len(x), _FIRST_STEP)
     x, slope = settle(x.copy(), newton(x, t, x)[1])
@@ -71,7 +74,10 @@ def follow(
 
 
 def _predicted(newton: Newton, x: Complex, k1: Complex, t: Real, h: Real) -> Complex:
-    """Return the predicted roots (r, n) at t + h, from x with slopes k1."""
+    """Return the roots (r, n) at t + h predicted by one Runge-Kutta step.
+
+    `x` (r, n) are the roots at t (r,), `k1` their derivatives by t, and `h` (r,) the steps.
+    """
     s = h[:, None]
     _, k2 = newton(x + s / 2 * k1, t + h / 2, x)
     _, k3 = newton(x + s / 2 * k2, t + h / 2, x)
@@ -80,7 +86,10 @@ def _predicted(newton: Newton, x: Complex, k1: Complex, t: Real, h: Real) -> Com
 
 
 def solved(A: Complex, b: Complex) -> Complex:
-    """Return the solutions (r, n, k) of A x = b; NaN if A is exactly singular."""
+    """Return the solutions (r, n, k) of r linear systems A x = b.
+
+    NaN if a matrix is exactly singular. `A` is (r, n, n) and `b` is (r, n, k).
+    """
     try:
         return np.asarray(np.linalg.solve(A, b), np.complex128)
     except np.linalg.LinAlgError:

@@ -69,7 +69,7 @@ class Entries:
     shape: tuple[int, int]
 
     def dense(self) -> Array:
-        """Return the dense matrix."""
+        """Return the matrix as a dense array of the given shape."""
         full = np.zeros(self.shape)
         full[self.rows, self.columns] = self.values
         return full
@@ -193,11 +193,12 @@ def gauss_newton(
 
 
 def _indices(numbers: Iterable[int]) -> NDArray[np.intc]:
+    """Return integers as an array of C integers."""
     return np.array(numbers, dtype=np.intc)
 
 
 def _all_entries(J: Vector) -> Entries:
-    """Return all elements of a dense matrix, including zeros."""
+    """Return a dense matrix as `Entries` with all its elements, including zeros."""
     rows, columns = np.indices(J.shape).reshape(2, -1)
     return Entries(rows, columns, J.ravel(), J.shape)
 
@@ -208,7 +209,9 @@ def _sparse_step(
     shape: tuple[int, int],
     filled: int,
 ) -> Any:
-    """Return an evaluation of `sparse_solution`; None if the matrix is small or dense.
+    """Return `sparse_solution` in the form that the run-time library calls.
+
+    None if the matrix is small or dense, so that the library uses its own dense solution.
 
     Args:
         rows: (k,) row of each element.
@@ -230,7 +233,7 @@ def _sparse_step(
 
 
 class NewtonEquations:
-    """Equations r(q, p) = 0, solved repeatedly for some elements of q."""
+    """Equations r(q, p) = 0, solved repeatedly for some elements of q, by any thread."""
 
     def __init__(self, equations: Function, values: Function) -> None:
         """Store the Functions.
@@ -269,7 +272,7 @@ class NewtonEquations:
 
 
 class _Workspace:
-    """Evaluations of equations with their own memory, for one thread at a time."""
+    """Evaluations of `NewtonEquations` with their own memory, for one thread at a time."""
 
     def __init__(self, equations: Function, values: Function) -> None:
         pattern = equations.sparsity_out(1)
@@ -281,7 +284,7 @@ class _Workspace:
     def solved(
         self, q: Vector, p: Vector, free: Sequence[int], tolerance: Vector
     ) -> tuple[Vector, LeastSquaresResult]:
-        """Return the result of `NewtonEquations.near`."""
+        """Solve r(q, p) = 0 for the elements `free` of q; see `NewtonEquations.near`."""
         found, unknowns = np.array(q, dtype=float), _indices(free)
         number = np.full(len(q), -1, dtype=np.intc)
         number[unknowns] = np.arange(len(free))
@@ -317,7 +320,7 @@ _SETTLED = 1e-16
 def levenberg_marquardt(
     function: Callable[[Vector], tuple[Vector, Vector]], start: Vector, *, iterations: int = 300
 ) -> LeastSquaresResult:
-    """Return a local minimum of r' r, even if the Jacobian loses rank at it.
+    """Find a local minimum of r' r, even if the Jacobian loses rank at it.
 
     The step s solves (J' J + mu 1) s = -J' r. mu decreases after a successful step and increases
     after a failed one.

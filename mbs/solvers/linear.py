@@ -9,10 +9,10 @@ from casadi import MX, SX, Function, Sparsity
 
 
 def solve_square(A: SX, B: SX) -> SX:
-    """Return the solution X of A X = B for a regular (n, n) matrix A.
+    """Return the solution X (n, m) of A X = B for a regular (n, n) matrix A and B (n, m).
 
     Up to three equations are solved by the adjugate (one division), larger systems by QR on the
-    blocks that the sparsity couples.
+    blocks that the sparsity couples. The result is not finite if A is singular.
     """
     n = A.shape[0]
     if n == 0:
@@ -25,6 +25,7 @@ def solve_square(A: SX, B: SX) -> SX:
 
 
 def _adjugate(A: SX) -> SX:
+    """Return the adjugate of a matrix A with one to three rows: A^-1 times its determinant."""
     match A.shape[0]:
         case 1:
             return SX(1)
@@ -44,11 +45,13 @@ def _adjugate(A: SX) -> SX:
 
 
 def partial_ldl(S: SX, least: SX) -> tuple[SX, SX, list[int], SX]:
-    """Return L D L' of the rows with sufficiently large pivots, in the form of `casadi.ldl`.
+    """Return L D L' factors of a symmetric matrix S, without rows whose pivots are too small.
+
+    Omitted rows depend nearly on others. The result has the form of `casadi.ldl`.
 
     The remainder of a nearly dependent row is rounding error, and so is its pivot. A division would
-    spread numbers of the size of one to all later rows and make their solution wrong. Such a row
-    is omitted from L, as if S did not contain it.
+    spread numbers of the size of one to all later rows and make their solution wrong. Such a row is
+    omitted from L, as if S did not contain it.
 
     Source: Davis 2006, section 4.8, for the order of the sums.
 
@@ -57,9 +60,9 @@ def partial_ldl(S: SX, least: SX) -> tuple[SX, SX, list[int], SX]:
         least: (n, 1) lower limit of the pivot of each row of S.
 
     Returns:
-        D (n, 1), L' without its diagonal (n, n) and the order p of the rows, so that
-        S[p, p] = L D L', as `casadi.ldl_solve` requires; and in this order whether the pivot is
-        large enough (n, 1). For an omitted row, D is the rounding error that remains of it.
+        D (n, 1), L' without its diagonal (n, n) and the order p of the rows, so that S[p, p] = L D
+        L', as `casadi.ldl_solve` requires; and in this order whether the pivot is large enough (n,
+        1). For an omitted row, D is the rounding error that remains of it.
     """
     pattern, order = S.sparsity().ldl()
     W, least = S[order, order], casadi.densify(least)[order]
@@ -156,11 +159,13 @@ def solve_saddle(
 
 
 def elimination_order(pattern: Sparsity, n: int) -> list[int]:
-    """Return an elimination order: fewest neighbours first, a row of J after its columns.
+    """Return the order in which the rows of a symmetric matrix are eliminated.
+
+    The row with the fewest neighbours is next, and a row of J comes after its columns.
 
     Args:
         pattern: sparsity of the symmetric matrix [A J'; J C].
-        n: size of A.
+        n: number of rows of A.
     """
     columns, rows = pattern.get_triplet()[1], pattern.get_triplet()[0]
     neighbours: list[set[int]] = [set() for _ in range(pattern.size1())]
@@ -188,7 +193,9 @@ def elimination_order(pattern: Sparsity, n: int) -> list[int]:
 
 
 def newton_step(rows: Function, slopes: Function) -> Function:
-    """Return ``closure(x, z, p) -> (z_next, residual)`` with z_next = z - J^-1 r.
+    """Return a Newton step as a Function with the exact derivatives of the solution.
+
+    It is ``closure(x, z, p) -> (z_next, residual)`` with z_next = z - J^-1 r.
 
     Its derivatives treat J as constant. At r = 0 the derivatives of z_next by x and p are then the
     exact derivatives of the solution, -J^-1 dr, without second derivatives. Elsewhere they are

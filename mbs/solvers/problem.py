@@ -115,7 +115,11 @@ class EventMotion:
 
 
 def fired_of(flags: npt.ArrayLike) -> tuple[int, ...]:
-    """Return the indices of the indicators whose flag is set."""
+    """Return the indices of the event indicators whose flag is not zero, in increasing order.
+
+    Args:
+        flags: (k,) flag of each event indicator.
+    """
     return tuple(np.flatnonzero(flags).tolist())
 
 
@@ -268,12 +272,12 @@ def equations(
         )
     t, x, p = casadi.MX.sym("t"), casadi.MX.sym("x", n), casadi.MX.sym("p", n_p)
     txp = [t, x, p]
-    slope = casadi.vec(_first(rhs, txp[: rhs.n_in()]))
-    f = _dense("mbs_rhs", txp, slope)
+    slope = casadi.vec(_first_output(rhs, txp[: rhs.n_in()]))
+    f = _dense_function("mbs_rhs", txp, slope)
     jacobian = None
     if method == "rodas":
         f_xt = [casadi.jacobian(slope, v) for v in (x, t)]
-        jacobian = _dense("mbs_jacobian", txp, *f_xt)
+        jacobian = _dense_function("mbs_jacobian", txp, *f_xt)
     g = None if project is None else _projection(project, txp)
     through = None if passage is None else _passage(passage, txp)
     if events is None:
@@ -283,7 +287,10 @@ def equations(
 
 
 def _passage(given: Passage, txp: list[casadi.MX]) -> Passage:
-    """Return the functions with the names that the integrator requires; vectors become dense."""
+    """Return a `Passage` with the function names that the integrator requires and dense vectors.
+
+    `txp` are the symbols of t, x and p.
+    """
 
     def vectors_dense(name: str, function: casadi.Function) -> casadi.Function:
         values = function.call(txp)
@@ -294,15 +301,17 @@ def _passage(given: Passage, txp: list[casadi.MX]) -> Passage:
         given,
         rows=vectors_dense("mbs_rows", given.rows),
         forces=vectors_dense("mbs_forces", given.forces),
-        regularity=_dense("mbs_regularity", txp, *given.regularity.call(txp)),
+        regularity=_dense_function("mbs_regularity", txp, *given.regularity.call(txp)),
     )
 
 
-def _first(function: casadi.Function, inputs: list[casadi.MX]) -> casadi.MX:
+def _first_output(function: casadi.Function, inputs: list[casadi.MX]) -> casadi.MX:
+    """Return the first output of a function for the symbolic `inputs`."""
     return function(*inputs) if function.n_out() == 1 else function(*inputs)[0]
 
 
-def _dense(name: str, inputs: list[casadi.MX], *outputs: casadi.MX) -> casadi.Function:
+def _dense_function(name: str, inputs: list[casadi.MX], *outputs: casadi.MX) -> casadi.Function:
+    """Return a Function with dense outputs, expanded to scalar operations if possible."""
     return _scalar(casadi.Function(name, inputs, [casadi.densify(value) for value in outputs]))
 
 
@@ -331,6 +340,10 @@ def _scalar(function: casadi.Function) -> casadi.Function:
 
 
 def _projection(project: casadi.Function, txp: list[casadi.MX]) -> casadi.Function:
+    """Return the projection as `mbs_project(t, x, p)`; raise ModelError if its sizes do not fit.
+
+    `txp` are the symbols of t, x and p.
+    """
     sizes = [symbol.numel() for symbol in txp]
     given = [project.numel_in(k) for k in range(project.n_in())]
     fits = len(given) in (2, 3) and given == sizes[: len(given)]
@@ -339,12 +352,16 @@ def _projection(project: casadi.Function, txp: list[casadi.MX]) -> casadi.Functi
             f"{project}: a projection is project(t, x, p) -> (x, residual), x ({sizes[1]},)"
         )
     outputs = project(*txp[: len(given)])
-    return _dense("mbs_project", txp, *map(casadi.vec, outputs))
+    return _dense_function("mbs_project", txp, *map(casadi.vec, outputs))
 
 
 def _event_functions(
     events: Events, txp: list[casadi.MX], slope: casadi.MX
 ) -> tuple[casadi.Function, casadi.Function, casadi.Function, casadi.Function | None]:
+    """Return indicators, their rates, jump and approaches (or None) with inputs (t, x, p).
+
+    `txp` are the symbols of t, x and p, and `slope` is x'. Raise ModelError if sizes do not fit.
+    """
     t, x, p = txp
     indicators, jump, n_modes = events.indicators, events.jump, len(numbers(events.modes))
     sizes = [1, x.numel(), p.numel()]
@@ -354,7 +371,7 @@ def _event_functions(
             f"{indicators}: indicators of events are indicators(t, x, p) -> g with the inputs of "
             f"the right-hand side, {sizes[1]} states and {sizes[2]} parameters and modes"
         )
-    g = casadi.vec(_first(indicators, txp[: len(given)]))
+    g = casadi.vec(_first_output(indicators, txp[: len(given)]))
     fired = casadi.MX.sym("fired", g.numel())
     taken = [jump.numel_in(k) for k in range(jump.n_in())]
     left = [jump.numel_out(k) for k in range(jump.n_out())]
@@ -374,10 +391,10 @@ def _event_functions(
             f" ({g.numel()}, 3)"
         )
     return (
-        _dense("mbs_indicators", txp, g),
-        _dense("mbs_rates", txp, rate),
-        _dense("mbs_jump", [*txp, fired], casadi.vec(after[0]), modes),
-        None if events.approaches is None else _dense("mbs_approaches", txp, near),
+        _dense_function("mbs_indicators", txp, g),
+        _dense_function("mbs_rates", txp, rate),
+        _dense_function("mbs_jump", [*txp, fired], casadi.vec(after[0]), modes),
+        None if events.approaches is None else _dense_function("mbs_approaches", txp, near),
     )
 
 
@@ -445,7 +462,7 @@ def problem(
 
 
 def numbers(values: npt.ArrayLike) -> Array:
-    """Return values as a vector of floats.
+    """Return values of any shape as a vector (n,) of floats.
 
     Raises:
         ModelError: the values are not numeric.
@@ -503,15 +520,12 @@ _OF_LAW = re.compile(
 
 
 def failure_of(error: RuntimeError, reason: str) -> Failure:
-    """Return the failure of an evaluation that CasADi ended with an error.
+    """Return a `Failure` for an evaluation that CasADi ended with an error.
 
-    Args:
-        error: raised by CasADi.
-        reason: key of REASONS, if the evaluation has no value.
+    Raise if it must stop.
 
-    Raises:
-        KeyboardInterrupt: control-C was pressed during the evaluation.
-        LawFailure: a law that is a Callback raised an error.
+    Returns:
+        `Failure(reason)`, whose catcher shortens the step.
     """
     text = str(error)
     if text.rstrip().endswith("KeyboardInterrupt"):

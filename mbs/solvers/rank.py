@@ -26,7 +26,7 @@ _FLOOR = 1e-12
 
 
 def dense(matrix: DM) -> Matrix:
-    """Return a sparse matrix as a dense array; DM.full would make a list of all elements."""
+    """Return a DM matrix as a dense array of the same shape."""
     full = np.zeros(matrix.shape)
     rows, columns = matrix.sparsity().get_triplet()
     full[rows, columns] = matrix.nonzeros()
@@ -34,7 +34,7 @@ def dense(matrix: DM) -> Matrix:
 
 
 def first_best(scores: Sequence[float] | Matrix, equal: float = EQUAL) -> int:
-    """Return the index of the largest score; the first of several that differ by rounding only.
+    """Return the index of the largest score; the first one if several differ by rounding only.
 
     Args:
         scores: scores without NaN; at least one is finite.
@@ -51,7 +51,7 @@ def graded(score: float) -> float:
 
 
 def rank(matrix: Matrix, gap: float = RELATIVE_GAP) -> int:
-    """Return the number of singular values above `gap` times the largest."""
+    """Return the number of singular values above `gap` times the largest; 0 for an empty matrix."""
     if matrix.size == 0:
         return 0
     values = np.linalg.svd(matrix, compute_uv=False)
@@ -59,23 +59,29 @@ def rank(matrix: Matrix, gap: float = RELATIVE_GAP) -> int:
 
 
 def null_space(matrix: Matrix, gap: float = RELATIVE_GAP) -> Matrix:
-    """Return orthonormal columns (n, n - rank) of the null space of a matrix (m, n)."""
+    """Return orthonormal columns (n, n - rank) that span the null space of a matrix (m, n).
+
+    Singular values up to `gap` times the largest count as zero.
+    """
     return null_space_of(matrix, matrix.shape[1] - rank(matrix, gap))
 
 
 def null_space_of(matrix: Matrix, dimension: int) -> Matrix:
-    """Return orthonormal columns (n, dimension) with the smallest gains of a matrix (m, n)."""
+    """Return orthonormal columns (n, dimension) of an approximate null space of a matrix (m, n).
+
+    They are the right singular vectors of the smallest singular values.
+    """
     return np.array(np.linalg.svd(matrix)[2][matrix.shape[1] - dimension :].T)
 
 
 def independent_rows(
     matrices: Sequence[Matrix], count: int, first: tuple[int, ...] = ()
 ) -> list[int]:
-    """Return indices of `count` rows that are independent in all matrices, in increasing order.
+    """Return `count` row indices whose rows are independent in all matrices, in increasing order.
 
-    Gram-Schmidt with pivoting on all matrices at once. The next row has the longest part
-    orthogonal to the previous rows, by the geometric mean over the matrices, so that rows which
-    are dependent in a single matrix are avoided.
+    Gram-Schmidt with pivoting on all matrices at once. The next row has the longest part orthogonal
+    to the previous rows, by the geometric mean over the matrices, so that rows which are dependent
+    in a single matrix are avoided.
 
     Args:
         matrices: (m, n) each, the same rows at several configurations.
@@ -106,6 +112,6 @@ def independent_rows(
 
 
 def _mean_lengths(lengths: Matrix) -> Matrix:
-    """Return the geometric mean of each column."""
+    """Return the geometric mean over the matrices (m,) of row lengths (matrices, m)."""
     mean: Matrix = np.exp(np.mean(np.log(lengths + _FLOOR), axis=0))
     return mean

@@ -31,7 +31,7 @@ class Inertia:
 
     @staticmethod
     def zero() -> Inertia:
-        """Return the inertia of no body."""
+        """Return the inertia without mass: J (3, 3), ms (3, 1) and m are exact zeros."""
         return Inertia(zeros(3, 3), zeros(), SX(0))
 
     @staticmethod
@@ -49,7 +49,12 @@ class Inertia:
 
     @staticmethod
     def from_parameters(ten: SX) -> Inertia:
-        """Return the inertia of ten parameters XX XY XZ YY YZ ZZ MX MY MZ M, (10, 1)."""
+        """Return the inertia with ten given parameters, unchanged.
+
+        Args:
+            ten: (10, 1) XX XY XZ YY YZ ZZ [kg m^2], MX MY MZ [kg m] and M [kg], about the origin of
+                the frame.
+        """
         XX, XY, XZ, YY, YZ, ZZ = (ten[k] for k in range(6))
         J = casadi.vertcat(
             casadi.horzcat(XX, XY, XZ), casadi.horzcat(XY, YY, YZ), casadi.horzcat(XZ, YZ, ZZ)
@@ -69,11 +74,15 @@ class Inertia:
         return Inertia(self.J + other.J, self.ms + other.ms, self.m + other.m)
 
     def momentum(self, linear: SX, angular: SX) -> tuple[SX, SX]:
-        """Return linear momentum and angular momentum about the origin, (3, 1) each.
+        """Return linear momentum and angular momentum about the origin of the frame, (3, 1) each.
 
         Args:
-            linear: (3, 1) velocity of the origin, in the same frame.
-            angular: (3, 1) angular velocity, in the same frame.
+            linear: (3, 1) velocity of the origin, in axes of the frame [m/s].
+            angular: (3, 1) angular velocity of the body, in axes of the frame [rad/s].
+
+        Returns:
+            m linear + angular x ms [kg m/s], and J angular + ms x linear [kg m^2/s], in axes of the
+            frame.
         """
         return _momentum(self.J, self.ms, self.m, linear, angular)
 
@@ -93,14 +102,23 @@ class Inertia:
         return moved
 
     def rotate(self, R: Rotation) -> Inertia:
-        """Transform to the axes of frame i; R is the orientation of the current axes in i."""
+        """Transform to a frame i with the same origin and other axes.
+
+        Args:
+            R: orientation of the current axes relative to i: it maps a vector from current axes to
+                i.
+        """
         return Inertia(R.apply_to_tensor(self.J), R.apply(self.ms), self.m)
 
     def shift(self, axis: int, t: SX) -> Inertia:
-        """Return the inertia of the body displaced by t [m] along a coordinate axis.
+        """Return the inertia of the body displaced by t along an axis, about the same origin.
 
         The cost is three products: let h = ms + m t along the axis, then the moments of inertia
         about both normal axes change by t (ms + h).
+
+        Args:
+            axis: index of the axis: 0, 1 or 2 for x, y or z.
+            t: displacement [m]; frame axes are kept.
         """
         if t.is_zero():
             return self
@@ -113,9 +131,13 @@ class Inertia:
         return Inertia(J, ms, self.m)
 
     def along_axis(self) -> tuple[Inertia, Inertia]:
-        """Split the body in two: a body with zero YY, MZ and M, and mass on the z axis.
+        """Split the inertia in two terms, whose sum it is.
 
-        A rotation about z does not affect the second body.
+        A rotation about z does not change the second term.
+
+        Returns:
+            term with zero YY, MZ and M (XX is XX - YY), and term with XX = YY, MZ and M: mass on
+            the z axis.
         """
         J, on_axis = +self.J, zeros(3, 3)
         on_axis[0, 0] = on_axis[1, 1] = self.J[1, 1]
@@ -125,16 +147,25 @@ class Inertia:
         return Inertia(J, ms, SX(0)), Inertia(on_axis, height, self.m)
 
     def rotational(self) -> tuple[Inertia, Inertia]:
-        """Split the body in two: a body with zero J, and a body with J only."""
+        """Split the inertia in two terms, whose sum it is.
+
+        Returns:
+            term with first moments and mass (J is zero), and term with J only.
+        """
         return Inertia(zeros(3, 3), self.ms, self.m), Inertia(self.J, zeros(), SX(0))
 
     def massive(self) -> tuple[Inertia, Inertia]:
-        """Split the body in two: a body with zero mass, and a point mass at the origin."""
+        """Split the inertia in two terms, whose sum it is.
+
+        Returns:
+            term with J and first moments (the mass is zero), and the mass as a point at the origin.
+        """
         return Inertia(self.J, self.ms, SX(0)), Inertia(zeros(3, 3), zeros(), self.m)
 
 
 @formula((3, 3), (3, 1), (1, 1), (3, 1), (3, 1))
 def _momentum(J: SX, ms: SX, m: SX, linear: SX, angular: SX) -> tuple[SX, SX]:
+    """Return m v + w x ms and J w + ms x v, (3, 1) each; v is `linear` and w is `angular`."""
     return m * linear + cross(angular, ms), casadi.mtimes(J, angular) + cross(ms, linear)
 
 
@@ -162,7 +193,7 @@ class PseudoInertia:
 
     @staticmethod
     def of(inertia: Inertia) -> PseudoInertia:
-        """Convert from the inertia tensor: S = tr(J) / 2 - J."""
+        """Convert from the inertia tensor J about the same origin: S = tr(J) / 2 - J."""
         J = inertia.J
         S = casadi.densify(-J)
         for k in range(3):
@@ -171,7 +202,7 @@ class PseudoInertia:
         return PseudoInertia(S, inertia.ms, inertia.m)
 
     def inertia(self) -> Inertia:
-        """Convert to the inertia tensor: J = tr(S) - S."""
+        """Convert to the inertia tensor about the same origin: J = tr(S) - S."""
         S = self.S
         J = casadi.densify(-S)
         for k in range(3):
@@ -184,11 +215,21 @@ class PseudoInertia:
         return PseudoInertia(self.S + other.S, self.ms + other.ms, self.m + other.m)
 
     def rotate(self, R: Rotation) -> PseudoInertia:
-        """Transform to the axes of frame i; R is the orientation of the current axes in i."""
+        """Transform to a frame i with the same origin and other axes.
+
+        Args:
+            R: orientation of the current axes relative to i: it maps a vector from current axes to
+                i.
+        """
         return PseudoInertia(R.apply_to_tensor(self.S), R.apply(self.ms), self.m)
 
     def shift(self, axis: int, t: SX) -> PseudoInertia:
-        """Return the inertia of the body displaced by t [m] along a coordinate axis."""
+        """Return the inertia of the body displaced by t along an axis, about the same origin.
+
+        Args:
+            axis: index of the axis: 0, 1 or 2 for x, y or z.
+            t: displacement [m]; frame axes are kept.
+        """
         if t.is_zero():
             return self
         S, ms = +self.S, +self.ms
@@ -200,9 +241,12 @@ class PseudoInertia:
         return PseudoInertia(S, ms, self.m)
 
     def along_axis(self) -> tuple[PseudoInertia, PseudoInertia]:
-        """Split the body in two: a body with zero S33, MZ and M, and mass on the z axis.
+        """Split the inertia in two terms, whose sum it is.
 
-        A rotation about z does not affect the second body.
+        A rotation about z does not change the second term.
+
+        Returns:
+            term with zero S33, MZ and M, and term with S33, MZ and M only: mass on the z axis.
         """
         S, on_axis, ms, height = +self.S, zeros(3, 3), +self.ms, zeros()
         on_axis[2, 2], S[2, 2] = S[2, 2], 0
@@ -210,11 +254,19 @@ class PseudoInertia:
         return PseudoInertia(S, ms, SX(0)), PseudoInertia(on_axis, height, self.m)
 
     def rotational(self) -> tuple[PseudoInertia, PseudoInertia]:
-        """Split the body in two: a body with zero S, and a body with S only."""
+        """Split the inertia in two terms, whose sum it is.
+
+        Returns:
+            term with first moments and mass (S is zero), and term with S only.
+        """
         return PseudoInertia(zeros(3, 3), self.ms, self.m), PseudoInertia(self.S, zeros(), SX(0))
 
     def massive(self) -> tuple[PseudoInertia, PseudoInertia]:
-        """Split the body in two: a body with zero mass, and a point mass at the origin."""
+        """Split the inertia in two terms, whose sum it is.
+
+        Returns:
+            term with S and first moments (the mass is zero), and the mass as a point at the origin.
+        """
         return PseudoInertia(self.S, self.ms, SX(0)), PseudoInertia(zeros(3, 3), zeros(), self.m)
 
 

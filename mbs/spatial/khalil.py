@@ -62,7 +62,7 @@ class Khalil:
 
     @staticmethod
     def identity() -> Khalil:
-        """Return the placement of coincident frames."""
+        """Return the placement of a frame j that coincides with frame i: six zeros."""
         return Khalil(*(SX(0) for _ in range(6)))
 
     @property
@@ -81,14 +81,23 @@ class Khalil:
 
     @property
     def seat(self) -> tuple[ScrewDisplacement, ...]:
-        """Displacements from frame i to the axis of joint j: gamma and b, then alpha and d."""
+        """Two displacements from frame i to the axis of joint j.
+
+        The first is a screw of gamma and b about z, the second a screw of alpha and d about x.
+        """
         return ScrewDisplacement.about("z", self.gamma, self.b), ScrewDisplacement.about(
             "x", self.alpha, self.d
         )
 
     @property
     def fixed(self) -> tuple[ScrewDisplacement, ...]:
-        """Displacements from frame i to frame j without a joint between them."""
+        """Three displacements from frame i to frame j, if no joint moves frame j.
+
+        They are `seat`, then a screw of theta and r about z.
+
+        A placement with theta = -90 degrees and alpha = 0 is written with gamma - 90 degrees and a
+        translation by d along y.
+        """
         if not self._shifts_across:
             return *self.seat, ScrewDisplacement.about("z", self.theta, self.r)
         turn = ScrewDisplacement.about("z", exact_sum(self.gamma, SX(-_QUARTER)), self.b)
@@ -122,16 +131,24 @@ class Khalil:
         return gamma.apply(vector([self.d, -self.r * alpha.s, self.b + self.r * alpha.c]))
 
     def rotate(self, angle: SX) -> Khalil:
-        """Return the placement of frame j rotated by an angle [rad] about its own z axis."""
+        """Return the placement of frame j rotated about its own z axis.
+
+        Args:
+            angle: angle [rad], which is added to theta.
+        """
         return replace(self, theta=self.theta + angle)
 
     def shift(self, distance: SX) -> Khalil:
-        """Return the placement of frame j shifted by a distance [m] along its own z axis."""
+        """Return the placement of frame j shifted along its own z axis.
+
+        Args:
+            distance: displacement [m], which is added to r.
+        """
         return replace(self, r=self.r + distance)
 
 
 def frames_to(pose: Pose, size: float) -> tuple[Khalil, ...]:
-    """Convert a pose to successive placements, whose product is the pose.
+    """Convert a pose to one or more successive Khalil placements, whose product is the pose.
 
     One placement suffices if the common perpendicular of the two axes is near. Otherwise fixed
     frames precede it: one for a shift normal to both axes, and one for each further rotation by a
@@ -143,6 +160,9 @@ def frames_to(pose: Pose, size: float) -> tuple[Khalil, ...]:
         pose: numeric pose, or product of rotations by symbols about coordinate axes and numeric
             poses, with its `chain`.
         size: size of the mechanism, such as the length of its largest link [m].
+
+    Returns:
+        at least one placement. The frame of each placement is the antecedent of the next placement.
 
     Raises:
         ValueError: the orientation depends on symbols, and the pose has no chain.
@@ -165,7 +185,10 @@ def frames_to(pose: Pose, size: float) -> tuple[Khalil, ...]:
 
 @dataclass(slots=True)
 class _Segment:
-    """Displacement Rz(gamma) T(x, y, z) Rx(alpha): the shift is in the axes after gamma."""
+    """Displacement Rz(gamma) T(x, y, z) Rx(alpha), angles in rad and lengths in m.
+
+    The translation is in the axes that gamma has rotated. Methods change the object in place.
+    """
 
     gamma: SX
     x: SX
@@ -174,16 +197,20 @@ class _Segment:
     alpha: SX
 
     def shift(self, x: SX, y: SX, z: SX) -> None:
-        """Add a shift in the axes before the rotation alpha."""
+        """Add (x, y, z) [m] to the translation, in the axes before the rotation alpha."""
         self.x, self.y, self.z = exact_sum(self.x, x), exact_sum(self.y, y), exact_sum(self.z, z)
 
     def shift_behind(self, x: SX, y: SX, z: SX) -> None:
-        """Add a shift in the axes after the rotation alpha."""
+        """Add (x, y, z) [m] to the translation, in the axes after the rotation alpha."""
         self.shift(*_rotate("x", self.alpha, x, y, z))
 
 
 def _segments(pose: Pose, size: float) -> tuple[list[_Segment], SX, SX]:
-    """Split a pose into segments, followed by theta and r of the last frame."""
+    """Factor a pose into displacements Rz T Rx, followed by Rz(theta) Tz(r) of the last frame.
+
+    Return the displacements, theta [rad] and r [m]. `size` [m] is the size of the mechanism:
+    lengths below 1e-14 of it become zero.
+    """
     segments: list[_Segment] = []
     # displacement after the last rotation about x: rotation about z, then shift in rotated axes
     theta, x, y, z = SX(0), SX(0), SX(0), SX(0)
@@ -221,9 +248,10 @@ def _segments(pose: Pose, size: float) -> tuple[list[_Segment], SX, SX]:
 
 
 def _elementary(pose: Pose) -> Iterator[tuple[str, SX, Sequence[SX]]]:
-    """Yield (axis, angle, shift) of elementary displacements: rotations about z or x, and shifts.
+    """Yield the factors of a pose as (axis, angle [rad], translation [m]).
 
-    The axis of a shift is "".
+    A rotation has the axis "z" or "x" and zero translation. A translation has the axis "" and angle
+    zero. Rotations about y and numeric orientations are factored into rotations about z and x.
     """
     nothing = (SX(0), SX(0), SX(0))
     for step in pose.steps:
@@ -241,7 +269,12 @@ def _elementary(pose: Pose) -> Iterator[tuple[str, SX, Sequence[SX]]]:
 
 
 def _euler_angles(R: Sequence[Sequence[float]]) -> tuple[float, float, float]:
-    """Angles of R = Rz(gamma) Rx(alpha) Rz(theta) with gamma between -90 and 90 degrees [rad]."""
+    """Return (gamma, alpha, theta) [rad] of R = Rz(gamma) Rx(alpha) Rz(theta).
+
+    Gamma is between -90 and 90 degrees.
+
+    If z of R is along z, gamma is zero. R has three numeric rows.
+    """
     if R[0][2] == 0 and R[1][2] == 0:
         if R[2][2] > 0:
             return 0.0, 0.0, _atan2(R[1][0], R[0][0])
@@ -270,7 +303,11 @@ def _atan2(y: float, x: float) -> float:
 
 
 def _frames(segment: _Segment, theta: SX, size: float) -> tuple[list[Khalil], SX]:
-    """Placements of a segment followed by Rz(theta), and the remaining shift along the last z."""
+    """Return the placements whose product is a segment times Rz(theta), and a length.
+
+    The last placement must still be shifted along its z axis by the remaining length [m]. `size` is
+    the size of the mechanism [m].
+    """
     gamma, alpha, x, y, z = segment.gamma, segment.alpha, segment.x, segment.y, segment.z
     sine, cosine = axis_rotation("x", alpha).s, axis_rotation("x", alpha).c
     if sine.is_zero():
@@ -295,14 +332,22 @@ def _frames(segment: _Segment, theta: SX, size: float) -> tuple[list[Khalil], SX
 
 
 def _is_near(b: SX, r: SX, sine: float, size: float) -> bool:
-    """Whether the distances b and r from both frames to the common perpendicular are small."""
+    """Return whether the common perpendicular of two axes is near both frames.
+
+    `b` and `r` are the distances of the frames along their axes [m], `sine` is the sine of the
+    angle between the axes, and `size` the size of the mechanism [m]. For symbolic b or r, `sine`
+    decides.
+    """
     if b.is_constant() and r.is_constant():
         return max(abs(float(b)), abs(float(r))) <= _FARTHEST * size
     return sine >= _LEAST_SINE
 
 
 def _rotate(axis: str, angle: SX, x: SX, y: SX, z: SX) -> tuple[SX, SX, SX]:
-    """Rotate a shift (x, y, z) about the axis "x" or "z"; exact zeros stay zero."""
+    """Rotate the vector (x, y, z) by `angle` [rad] about the axis "x" or "z".
+
+    Exact zeros stay zero.
+    """
     turn = axis_rotation(axis, angle)
     if axis == "x":
         y, z = exact_sum(turn.c * y, -turn.s * z), exact_sum(turn.s * y, turn.c * z)
@@ -312,7 +357,12 @@ def _rotate(axis: str, angle: SX, x: SX, y: SX, z: SX) -> tuple[SX, SX, SX]:
 
 
 def _clean(segment: _Segment, size: float) -> None:
-    """Set lengths to zero that are rounding errors, or that vanish for all values of symbols."""
+    """Set x, y, z of a segment to zero, in place, if they are rounding errors.
+
+    They are compared with `size`, the size of the mechanism [m].
+
+    A symbolic length becomes zero if it vanishes at all test values of its symbols.
+    """
     lengths = (segment.x, segment.y, segment.z)
     x, y, z = (SX(0) if _is_noise(length, size) else length for length in lengths)
     if not all(length.is_constant() for length in (x, y, z)):
@@ -329,11 +379,15 @@ def _clean(segment: _Segment, size: float) -> None:
 
 
 def _is_noise(length: SX, size: float) -> bool:
+    """Return whether a length is a number of at most 1e-14 times `size` [m]."""
     return bool(length.is_constant() and abs(float(length)) <= _NOISE * size)
 
 
 def _direction(x: SX, y: SX) -> float | None:
-    """Angle of (x, y) modulo pi [rad]; None if it depends on the values of symbols."""
+    """Return the angle of the vector (x, y) [rad], up to a half turn.
+
+    None if it depends on symbols.
+    """
     if x.is_constant() and y.is_constant():
         return math.atan2(float(y), float(x))
     if y.is_zero():
@@ -351,7 +405,10 @@ def _direction(x: SX, y: SX) -> float | None:
 
 
 def _samples(*lengths: SX) -> list[tuple[float, ...]]:
-    """Values of lengths at six sets of values of their symbols, of both signs."""
+    """Return the values of the lengths at six sets of values of their symbols.
+
+    A set at which a length is not finite is omitted.
+    """
     symbols = casadi.symvar(casadi.vertcat(*lengths))
     at = Function("lengths", [casadi.vertcat(*symbols)], [casadi.densify(casadi.vertcat(*lengths))])
     rows = [

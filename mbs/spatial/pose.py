@@ -54,12 +54,17 @@ class Pose:
 
     @staticmethod
     def rotation(R: SX) -> Pose:
-        """Return the pose of a frame with the same origin and the orientation R (3, 3)."""
+        """Return the pose with zero origin and the orientation R (3, 3), with an empty `chain`."""
         return Pose(casadi.densify(R), zeros())
 
     @staticmethod
     def about(axis: str, angle: SX) -> Pose:
-        """Return the pose of a frame rotated by an angle [rad] about "x", "y" or "z"."""
+        """Return the pose of a frame with the same origin, rotated about a coordinate axis.
+
+        Args:
+            axis: "x", "y" or "z".
+            angle: angle [rad], a number or an expression. An expression is kept in the chain.
+        """
         R = axis_rotation(axis, angle).matrix
         return Pose(R, zeros(), () if R.is_constant() else (SymbolicRotation(axis, angle),))
 
@@ -78,7 +83,7 @@ class Pose:
         chain = _join(self, other) if self.chain or other.chain else ()
         for one, rest in ((self, other), (other, self)):
             if one.is_identity():
-                return Pose(_with_lone_ones(_own(rest.R)), _own(rest.p), chain)
+                return Pose(_with_lone_ones(_dense_copy(rest.R)), _dense_copy(rest.p), chain)
         return Pose(
             _with_lone_ones(exact_product(self.R, other.R)),
             exact_product(self.R, other.p, self.p),
@@ -86,21 +91,30 @@ class Pose:
         )
 
     def inverse(self) -> Pose:
-        """Return T_ji, the inverse of T_ij."""
+        """Return T_ji, the pose of frame i relative to frame j."""
         R = self.R.T
         return Pose(
             R,
             zeros() if self.p.is_zero() else exact_product(-R, self.p),
-            tuple(_inverse(step) for step in reversed(self.chain)),
+            tuple(
+                SymbolicRotation(step.axis, -step.angle)
+                if isinstance(step, SymbolicRotation)
+                else step.inverse()
+                for step in reversed(self.chain)
+            ),
         )
 
     @property
     def matrix(self) -> SX:
-        """(4, 4) homogeneous transform."""
+        """(4, 4) homogeneous transform [[R, p], [0, 1]] of points from frame j to frame i."""
         return _homogeneous(self.R, self.p)
 
     def at(self, p: SX) -> Pose:
-        """Return the pose with the same orientation and the origin p (3, 1) [m]."""
+        """Return the pose with the same orientation and another origin.
+
+        Args:
+            p: (3, 1) origin of frame j in frame i [m]; it replaces the present origin.
+        """
         turns = (
             step if isinstance(step, SymbolicRotation) else Pose.rotation(step.R)
             for step in self.chain
@@ -108,22 +122,27 @@ class Pose:
         return Pose(self.R, p, (Pose.translation(p), *turns) if self.chain else ())
 
     def is_identity(self) -> bool:
-        """Whether the pose is the constant identity."""
+        """Return whether R is the constant identity and p the constant zero."""
         return self.p.is_zero() and SX.binary(casadi.OP_SUB, self.R, _EYE).is_zero()
 
 
-def _own(value: SX) -> SX:
-    """Return a dense copy."""
+def _dense_copy(value: SX) -> SX:
+    """Return a dense copy of a matrix, so that changes in place do not affect the argument."""
     return +value if value.is_dense() else casadi.densify(value)
 
 
 @formula((3, 3), (3, 1))
 def _homogeneous(R: SX, p: SX) -> SX:
+    """Return the (4, 4) homogeneous transform of orientation R (3, 3) and origin p (3, 1)."""
     return casadi.vertcat(casadi.horzcat(R, p), casadi.horzcat(SX(DM([[0, 0, 0]])), SX(1)))
 
 
 def _join(first: Pose, second: Pose) -> tuple[SymbolicRotation | Pose, ...]:
-    """Join the chains of two poses and multiply adjacent numeric poses; empty if unknown."""
+    """Return the chain of factors of the product of two poses.
+
+    Adjacent numeric poses are multiplied. Empty if a factor is a symbolic orientation of unknown
+    factors.
+    """
     joined: list[SymbolicRotation | Pose] = []
     for step in (*first.steps, *second.steps):
         if isinstance(step, Pose):
@@ -136,17 +155,9 @@ def _join(first: Pose, second: Pose) -> tuple[SymbolicRotation | Pose, ...]:
     return tuple(joined)
 
 
-def _inverse(step: SymbolicRotation | Pose) -> SymbolicRotation | Pose:
-    return (
-        SymbolicRotation(step.axis, -step.angle)
-        if isinstance(step, SymbolicRotation)
-        else step.inverse()
-    )
-
-
 def _with_lone_ones(R: SX) -> SX:
-    """Set a constant that is the only nonzero in its row or column of a rotation to 1 or -1."""
-    if R.is_constant() and not _has_alone(numbers(R)):
+    """Set a constant of a rotation R that is alone in its row or column to 1 or -1, in place."""
+    if R.is_constant() and not _has_lone_constant(numbers(R)):
         return R
     entries = elements(R)
     for place, entry in enumerate(entries):
@@ -160,8 +171,11 @@ def _with_lone_ones(R: SX) -> SX:
     return R
 
 
-def _has_alone(elements: list[float]) -> bool:
-    """Whether one of nine elements is alone in its row or column and is not exactly 1 or -1."""
+def _has_lone_constant(elements: list[float]) -> bool:
+    """Return whether a row or column has a single nonzero element that is not 1 or -1.
+
+    `elements` are its nine numbers, column by column.
+    """
     lines = (*(elements[k : k + 3] for k in (0, 3, 6)), *(elements[k::3] for k in range(3)))
     return any(line.count(0.0) == 2 and max(map(abs, line)) != 1.0 for line in lines)
 
@@ -174,12 +188,25 @@ Wrench = tuple[SX, SX]
 
 
 def add_wrenches(a: Wrench, b: Wrench) -> Wrench:
-    """Return the sum of two wrenches about the same point."""
+    """Return the sum (force, moment) of two wrenches about the same point, in the same axes.
+
+    Args:
+        a: force and moment, (3, 1) each.
+        b: force and moment, (3, 1) each.
+    """
     return a[0] + b[0], a[1] + b[1]
 
 
 def transform_wrench(pose: Pose, wrench: Wrench) -> Wrench:
-    """Transform a wrench about and in frame j to frame i; `pose` is the pose of j in i."""
+    """Transform a wrench about the origin and in axes of frame j to frame i.
+
+    Args:
+        pose: pose of frame j relative to frame i.
+        wrench: force [N] and moment [N m], (3, 1) each, about the origin and in axes of j.
+
+    Returns:
+        force and moment about the origin and in axes of i: (R f, R m + p x R f).
+    """
     force, moment = (casadi.mtimes(pose.R, part) for part in wrench)
     return force, moment + cross(pose.p, force)
 
@@ -192,33 +219,43 @@ def transform_wrench(pose: Pose, wrench: Wrench) -> Wrench:
 
 
 class Transformable(Protocol):
-    """Protocol of a quantity about and in a frame that transforms like an inertia."""
+    """Protocol of a quantity that transforms like an inertia about and in a frame."""
 
     def rotate(self, R: Rotation) -> Self:
-        """Transform to the axes of frame i; R is the orientation of the current axes in i."""
+        """Transform to other axes with the same origin.
+
+        R maps a vector from current axes to the new axes.
+        """
 
     def shift(self, axis: int, t: SX) -> Self:
-        """Return the quantity displaced by t [m] along a coordinate axis."""
+        """Return the quantity of the body displaced by t [m] along the axis 0, 1 or 2."""
 
 
 Thing = TypeVar("Thing", bound=Transformable)
 
 
 class Displacement(Protocol):
-    """Protocol of a displacement from a frame i to a frame j."""
+    """Protocol of the rigid displacement from a frame i to a frame j."""
 
     @property
     def rotation(self) -> Rotation:
         """Orientation of frame j relative to frame i."""
 
     def point(self, r: SX) -> SX:
-        """Transform a point (3, 1) from frame j to frame i [m]."""
+        """Return the coordinates (3, 1) in frame i of the point r (3, 1) given in frame j [m]."""
 
     def wrench(self, f: SX, m: SX) -> Wrench:
-        """Transform a force and moment about and in frame j to a wrench about and in frame i."""
+        """Return the wrench (f, m) of frame j about the origin and in axes of frame i.
+
+        (3, 1) each, N and N m.
+        """
 
     def body(self, thing: Thing) -> Thing:
-        """Transform an inertia or a similar quantity from frame j to frame i."""
+        """Return an inertia, or a `Transformable`, of frame j about and in frame i.
+
+        Args:
+            thing: inertia about the origin and in axes of frame j.
+        """
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,7 +272,13 @@ class ScrewDisplacement:
 
     @staticmethod
     def about(axis: str, angle: SX, t: SX) -> ScrewDisplacement:
-        """Return the screw of an angle [rad] and a distance t [m] on the axis "x", "y" or "z"."""
+        """Return the screw of an angle [rad] and a translation t [m] about "x", "y" or "z".
+
+        Args:
+            axis: "x", "y" or "z".
+            angle: angle of rotation [rad].
+            t: translation along the axis [m].
+        """
         return ScrewDisplacement(axis_rotation(axis, angle), SX(t))
 
     @property
@@ -244,21 +287,29 @@ class ScrewDisplacement:
         return self.rotation.along
 
     def point(self, r: SX) -> SX:
-        """Transform a point (3, 1) from frame j to frame i [m]."""
+        """Return the coordinates (3, 1) in frame i of the point r (3, 1) given in frame j [m]."""
         return _shift_point(self.rotation.apply(r), self.t, self.axis)
 
     def wrench(self, f: SX, m: SX) -> Wrench:
-        """Transform a force and moment about and in frame j to a wrench about and in frame i."""
+        """Return the wrench (f, m) of frame j about the origin and in axes of frame i.
+
+        (3, 1) each, N and N m.
+        """
         f, m = self.rotation.apply(f), self.rotation.apply(m)
         return f, m if self.t.is_zero() else _shift_moment(f, m, self.t, *self.rotation.across)
 
     def body(self, thing: Thing) -> Thing:
-        """Transform an inertia or a similar quantity from frame j to frame i."""
+        """Return an inertia, or a `Transformable`, of frame j about and in frame i.
+
+        Args:
+            thing: inertia about the origin and in axes of frame j.
+        """
         return thing.rotate(self.rotation).shift(self.axis, self.t)
 
 
 @formula((3, 1), (1, 1))
 def _shift_point(r: SX, t: SX, axis: int) -> SX:
+    """Return the point r (3, 1) shifted by t [m] along the axis 0, 1 or 2."""
     moved = SX(r)
     moved[axis] += t
     return moved
@@ -266,7 +317,10 @@ def _shift_point(r: SX, t: SX, axis: int) -> SX:
 
 @formula((3, 1), (3, 1), (1, 1))
 def _shift_moment(f: SX, m: SX, t: SX, k: int, h: int) -> SX:
-    """Moment about a point shifted by -t [m] along the axis normal to the axes k and h."""
+    """Return the moment (3, 1) of a wrench (f, m) about a point shifted by -t [m] along an axis.
+
+    `k` and `h` are the indices of the axes normal to it, in cyclic order.
+    """
     moved = SX(m)
     moved[k] -= t * f[h]
     moved[h] += t * f[k]
@@ -286,16 +340,23 @@ class FreeDisplacement:
     p: SX
 
     def point(self, r: SX) -> SX:
-        """Transform a point (3, 1) from frame j to frame i [m]."""
+        """Return the coordinates (3, 1) in frame i of the point r (3, 1) given in frame j [m]."""
         return self.p + self.rotation.apply(r)
 
     def wrench(self, f: SX, m: SX) -> Wrench:
-        """Transform a force and moment about and in frame j to a wrench about and in frame i."""
+        """Return the wrench (f, m) of frame j about the origin and in axes of frame i.
+
+        (3, 1) each, N and N m.
+        """
         f, m = self.rotation.apply(f), self.rotation.apply(m)
         return f, m if is_zero(self.p) else m + cross(self.p, f)
 
     def body(self, thing: Thing) -> Thing:
-        """Transform an inertia or a similar quantity from frame j to frame i."""
+        """Return an inertia, or a `Transformable`, of frame j about and in frame i.
+
+        Args:
+            thing: inertia about the origin and in axes of frame j.
+        """
         moved = thing.rotate(self.rotation)
         for axis in range(3):
             moved = moved.shift(axis, self.p[axis])
@@ -303,7 +364,11 @@ class FreeDisplacement:
 
 
 def origin(steps: Sequence[Displacement]) -> SX:
-    """(3, 1) origin of the last frame of successive displacements in the first frame [m]."""
+    """Return the origin (3, 1) [m] of the last of successive frames, in the first frame.
+
+    Args:
+        steps: displacements, each from the frame that the previous displacement reaches.
+    """
     p = zeros()
     for step in reversed(steps):
         p = step.point(p)
@@ -311,14 +376,29 @@ def origin(steps: Sequence[Displacement]) -> SX:
 
 
 def transform_wrench_along(steps: Sequence[Displacement], f: SX, m: SX) -> Wrench:
-    """Transform a force f and moment m from the last frame of displacements to the first frame."""
+    """Transform a wrench from the last frame of successive displacements to the first frame.
+
+    Args:
+        steps: displacements, each from the frame that the previous displacement reaches.
+        f: (3, 1) force [N], in axes of the last frame.
+        m: (3, 1) moment about the origin of the last frame [N m], in its axes.
+
+    Returns:
+        force and moment about the origin of the first frame, in its axes.
+    """
     for step in reversed(steps):
         f, m = step.wrench(f, m)
     return f, m
 
 
 def transform_inertia_along(steps: Sequence[Displacement], thing: Thing) -> Thing:
-    """Transform an inertia or similar from the last frame of displacements to the first frame."""
+    """Transform an inertia from the last frame of successive displacements to the first frame.
+
+    Args:
+        steps: displacements, each from the frame that the previous displacement reaches.
+        thing: inertia about the origin and in axes of the last frame, or a `Transformable`
+            quantity.
+    """
     for step in reversed(steps):
         thing = step.body(thing)
     return thing

@@ -42,7 +42,7 @@ class Rotation(Protocol):
 
     @property
     def matrix(self) -> SX:
-        """(3, 3) orientation of frame j relative to frame i."""
+        """(3, 3) orientation of frame j relative to frame i: its columns are the axes of j in i."""
 
     def apply(self, vector: SX) -> SX:
         """Transform a vector (3, 1) from frame j to frame i."""
@@ -54,7 +54,7 @@ class Rotation(Protocol):
         """Transform a symmetric tensor (3, 3) from frame j to frame i."""
 
     def apply_to_square(self, square: SX) -> SX:
-        """Transform a general tensor (3, 3) from frame j to frame i."""
+        """Transform a general tensor `square` (3, 3) from frame j to frame i."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,12 +78,15 @@ class AxisRotation:
 
     @property
     def across(self) -> tuple[int, int]:
-        """Indices of the two axes that rotate, the first axis towards the second axis."""
+        """Indices (k, h) of the two other axes, in cyclic order.
+
+        A positive angle rotates axis k towards axis h.
+        """
         return _across(self.axis)
 
     @property
     def matrix(self) -> SX:
-        """(3, 3) orientation of the rotated frame."""
+        """(3, 3) orientation of the rotated frame relative to the fixed frame."""
         return _rotation_matrix(self.s, self.c, self.axis)
 
     def apply(self, vector: SX) -> SX:
@@ -95,27 +98,43 @@ class AxisRotation:
         return _rotate_vector(vector, -self.s, self.c, self.axis)
 
     def apply_to_tensor(self, tensor: SX) -> SX:
-        """Transform a symmetric tensor from the rotated to the fixed frame; 8 multiplications."""
-        return _rotate_square(tensor, self.s, self.c, self.axis, self._block, True)
+        """Transform a symmetric tensor (3, 3) from the rotated to the fixed frame.
+
+        The cost is 8 multiplications.
+
+        Args:
+            tensor: (3, 3) symmetric tensor.
+        """
+        return _rotate_square(tensor, self.s, self.c, self.axis, self._angle_case, True)
 
     def apply_to_square(self, square: SX) -> SX:
-        """Transform a general tensor from the rotated to the fixed frame; 12 multiplications."""
-        return _rotate_square(square, self.s, self.c, self.axis, self._block, False)
+        """Transform a general tensor (3, 3) from the rotated to the fixed frame.
+
+        The cost is 12 multiplications.
+
+        Args:
+            square: (3, 3) tensor, not necessarily symmetric.
+        """
+        return _rotate_square(square, self.s, self.c, self.axis, self._angle_case, False)
 
     @property
-    def _block(self) -> str:
-        """Kind of the angle: "quarter" for +-90 degrees, "still" for 0 or 180 degrees, or "any"."""
+    def _angle_case(self) -> str:
+        """Case of the angle in `_rotate_square`.
+
+        "quarter" for +-90 degrees, "still" for 0 or 180 degrees, else "any".
+        """
         return "quarter" if self.c.is_zero() else "still" if self.s.is_zero() else "any"
 
 
 def _across(axis: str) -> tuple[int, int]:
-    """Indices of the two axes that rotate, the first axis towards the second axis."""
+    """Return the indices (k, h) of the two axes normal to "x", "y" or "z", in cyclic order."""
     along = _AXES.index(axis)
     return (along + 1) % 3, (along + 2) % 3
 
 
 @formula((1, 1), (1, 1))
 def _rotation_matrix(s: SX, c: SX, axis: str) -> SX:
+    """Return the matrix (3, 3) of a rotation about "x", "y" or "z" with sine s and cosine c."""
     k, h = _across(axis)
     R = SX(DM.eye(3))
     R[k, k], R[k, h], R[h, k], R[h, h] = c, -s, s, c
@@ -124,6 +143,7 @@ def _rotation_matrix(s: SX, c: SX, axis: str) -> SX:
 
 @formula((3, 1), (1, 1), (1, 1))
 def _rotate_vector(vector: SX, s: SX, c: SX, axis: str) -> SX:
+    """Return a vector (3, 1) rotated about an axis "x", "y" or "z" with sine s and cosine c."""
     k, h = _across(axis)
     turned = +vector
     turned[k] = c * vector[k] - s * vector[h]
@@ -133,10 +153,11 @@ def _rotate_vector(vector: SX, s: SX, c: SX, axis: str) -> SX:
 
 @formula((3, 3), (1, 1), (1, 1))
 def _rotate_square(square: SX, s: SX, c: SX, axis: str, block: str, symmetric: bool) -> SX:
-    """Rotate a tensor.
+    """Return R T R' for a tensor T (3, 3), `square`, and a rotation R about "x", "y" or "z".
 
-    With w = c (a - e) - s (b + d), the block [[a, b], [d, e]] of the two rotating axes becomes
-    [[e + c w, b + s w], [d + s w, a - c w]].
+    s and c are sine and cosine of the angle, `block` is its `AxisRotation._angle_case`, and
+    `symmetric` is whether T is symmetric. With w = c (a - e) - s (b + d), the block [[a, b], [d,
+    e]] of the two rotating axes becomes [[e + c w, b + s w], [d + s w, a - c w]].
     """
     (k, h), m = _across(axis), _AXES.index(axis)
     a, b, d, e = square[k, k], square[k, h], square[h, k], square[h, h]
@@ -175,12 +196,13 @@ class MatrixRotation:
         return self.apply_to_square(tensor)
 
     def apply_to_square(self, square: SX) -> SX:
-        """Transform a general tensor (3, 3) from the rotated frame to the fixed frame."""
-        return _turned_by_matrix(square, self.matrix)
+        """Transform a general tensor `square` (3, 3) from the rotated frame to the fixed frame."""
+        return _rotate_by_matrix(square, self.matrix)
 
 
 @formula((3, 3), (3, 3))
-def _turned_by_matrix(square: SX, R: SX) -> SX:
+def _rotate_by_matrix(square: SX, R: SX) -> SX:
+    """Return R T R' for a tensor T (3, 3), `square`."""
     return casadi.mtimes(casadi.mtimes(R, square), R.T)
 
 
@@ -191,10 +213,14 @@ def axis_rotation(axis: str, angle: SX) -> AxisRotation:
 
 
 def align_z(direction: Sequence[float]) -> SX:
-    """Return a numeric rotation (3, 3) whose z axis is along `direction`, three numbers.
+    """Return a numeric rotation (3, 3) whose z axis is along a direction.
 
-    For the direction of a coordinate axis the other two axes are coordinate axes too, so that the
-    elements are 0 or 1: x, y, z of the new frame are (y, z, x) for direction x, (z, x, y) for y.
+    Its columns are the new axes in the old frame. For the direction of a coordinate axis the other
+    two axes are coordinate axes too, so that the elements are 0, 1 or -1: x, y, z of the new frame
+    are (y, z, x) for direction x, (z, x, y) for y.
+
+    Args:
+        direction: three numbers, not all zero; the length is irrelevant.
     """
     z = unit_vector([float(x) for x in direction])
     # coordinate axis nearest to z; the first axis in a tie, independent of rounding errors
@@ -208,7 +234,10 @@ def align_z(direction: Sequence[float]) -> SX:
 
 
 def unit_vector(vector: Sequence[float]) -> tuple[float, float, float]:
-    """Return the unit vector along three numbers; elements of rounding size become zero."""
+    """Return the unit vector along three numbers, not all zero.
+
+    Elements of at most 1e-14 times the length become zero.
+    """
     length = math.hypot(*vector)
     x, y, z = (0.0 if abs(x) <= _NOISE * length else x / length for x in vector)
     length = math.hypot(x, y, z)  # normalise again: removes the last rounding error
@@ -222,6 +251,10 @@ def nearest_rotation(matrix: Sequence[Sequence[float]], noise: float = _NOISE) -
     are orthonormalised together. The result is a rotation to machine precision.
 
     Source: Higham 1986 for the iteration to the orthogonal polar factor.
+
+    Args:
+        matrix: three rows of an approximate rotation.
+        noise: magnitude below which an element is set to zero.
     """
     R = [[float(x) for x in row] for row in matrix]
     for _ in range(_ROUNDS):
@@ -244,10 +277,10 @@ def nearest_rotation(matrix: Sequence[Sequence[float]], noise: float = _NOISE) -
 
 @formula((4, 1))
 def quaternion_rotation(quaternion: SX) -> SX:
-    """(3, 3) orientation matrix of a unit quaternion (w, x, y, z).
+    """Return the orientation matrix (3, 3) of a unit quaternion (w, x, y, z), (4, 1).
 
-    The diagonal elements have the form w^2 + x^2 - y^2 - z^2, so that R' R = |quaternion|^4 I for
-    any norm.
+    The matrix maps a vector from the rotated frame to the fixed frame. The diagonal elements have
+    the form w^2 + x^2 - y^2 - z^2, so that R' R = ``|quaternion|^4`` I for any norm.
 
     Source: Khalil & Dombre 2002, section 3.6.
     """
@@ -261,7 +294,7 @@ def quaternion_rotation(quaternion: SX) -> SX:
 
 
 def quaternion_rate(quaternion: SX, angular_velocity: SX) -> SX:
-    """(4, 1) time derivative of a quaternion [1/s].
+    """Return the time derivative (4, 1) of a quaternion [1/s].
 
     Args:
         quaternion: (4, 1) quaternion w, x, y, z of a frame.

@@ -24,7 +24,9 @@ Made = TypeVar("Made")
 def formula(
     *shapes: tuple[int, int],
 ) -> Callable[[Callable[Given, Made]], Callable[Given, Made]]:
-    """Decorator that traces a function of SX arguments once per case and then calls the graph.
+    """Return a decorator for functions of SX, which traces them once per case.
+
+    Later calls evaluate the traced graph.
 
     The call creates the same operations as the Python code, with constants folded, about ten times
     faster.
@@ -59,19 +61,23 @@ def formula(
 
 
 def vector(elements: Iterable[SX | float]) -> SX:
-    """Return the column of these scalars."""
+    """Return the column (n, 1) of n scalars, numbers or SX.
+
+    Args:
+        elements: n scalars.
+    """
     scalars = (one if isinstance(one, SX) else SX(one) for one in elements)
     return casadi.vertcat(*scalars)
 
 
 def zeros(rows: int = 3, columns: int = 1) -> SX:
-    """Return a dense SX matrix of zeros."""
+    """Return a dense SX matrix (rows, columns) of zeros."""
     return SX.zeros(rows, columns)
 
 
 @formula((3, 1))
 def skew(a: SX) -> SX:
-    """(3, 3) matrix S of the cross product with a: S b = a x b."""
+    """Return the (3, 3) matrix S of the cross product with a (3, 1): S b = a x b."""
     x, y, z = a[0], a[1], a[2]
     return casadi.vertcat(
         casadi.horzcat(0, -z, y), casadi.horzcat(z, 0, -x), casadi.horzcat(-y, x, 0)
@@ -80,24 +86,38 @@ def skew(a: SX) -> SX:
 
 @formula((3, 1), (3, 1))
 def cross(a: SX, b: SX) -> SX:
-    """(3, 1) cross product of a and b, by scalars so that zeros are folded."""
+    """Return the cross product a x b (3, 1), computed by scalars so that zeros are folded."""
     (a_x, a_y, a_z), (b_x, b_y, b_z) = elements(a), elements(b)
     return casadi.vertcat(a_y * b_z - a_z * b_y, a_z * b_x - a_x * b_z, a_x * b_y - a_y * b_x)
 
 
 def is_zero(value: SX) -> bool:
-    """Whether all elements are the constant zero; a symbol is not."""
+    """Return whether all elements are the constant zero; False for an expression with symbols.
+
+    Args:
+        value: matrix.
+    """
     return value.is_zero()
 
 
 def elements(value: SX) -> list[SX]:
-    """Return the scalars of a matrix, column by column, including zeros."""
+    """Return the scalars of a matrix, column by column, including zeros, as 1 x 1 SX.
+
+    Args:
+        value: (m, n) matrix, possibly sparse.
+    """
     dense = value if value.is_dense() else casadi.densify(value)
     return cast("list[SX]", dense.nonzeros())
 
 
 def numbers(value: SX) -> list[float]:
-    """Return the elements of a constant matrix as floats, column by column."""
+    """Return the elements of a constant matrix as floats, column by column.
+
+    Raise if it has symbols.
+
+    Args:
+        value: (m, n) matrix without symbols.
+    """
     return [float(element) for element in elements(value)]
 
 
@@ -106,16 +126,23 @@ def numbers(value: SX) -> list[float]:
 
 
 def plus(a: SX, b: SX) -> SX:
-    """Return the expression a + b."""
+    """Return a + b elementwise, for SX of equal shape or a scalar.
+
+    Faster than the Python operator.
+    """
     return SX.binary(casadi.OP_ADD, a, b)
 
 
 def times(a: SX, b: SX) -> SX:
-    """Return the elementwise product a * b."""
+    """Return a * b elementwise, for SX of equal shape or a scalar.
+
+    Faster than the Python operator.
+    """
     return SX.binary(casadi.OP_MUL, a, b)
 
 
 def _sine_and_cosine(angle: SX) -> tuple[SX, SX]:
+    """Return the expressions sin(angle) and cos(angle), without simplification."""
     return SX.unary(casadi.OP_SIN, angle), SX.unary(casadi.OP_COS, angle)
 
 
@@ -133,6 +160,7 @@ def exact_sum(a: SX, b: SX) -> SX:
 
 @formula((3, 3), (3, 3))
 def _product(A: SX, B: SX) -> SX:
+    """Return A B for (3, 3) matrices."""
     return casadi.mtimes(A, B)
 
 
@@ -144,6 +172,7 @@ def product_with_vector(A: SX, b: SX) -> SX:
 
 @formula((3, 3), (3, 1), (3, 1))
 def _sum_with_product(A: SX, b: SX, c: SX) -> SX:
+    """Return A b + c for A (3, 3), b (3, 1) and c (3, 1)."""
     return c + casadi.mtimes(A, b)
 
 
@@ -182,7 +211,7 @@ def exact_product(A: SX, B: SX, C: SX | None = None) -> SX:
 
 
 def _largest_number(value: SX) -> float:
-    """Largest magnitude of the constant elements; zero if there are none."""
+    """Return the largest magnitude of the constant elements of a matrix; zero if it has none."""
     return max((abs(float(e)) for e in elements(value) if e.is_constant()), default=0.0)
 
 
@@ -196,10 +225,10 @@ a few multiples have rounding errors of 4e-16 each, and intended tilts in files 
 
 
 def sin_cos(angle: SX) -> tuple[SX, SX]:
-    """Return sine and cosine of an angle [rad], exact for multiples of 90 degrees in it.
+    """Return sine and cosine of a scalar angle [rad], exact at multiples of 90 degrees.
 
-    sin(pi/2) is 1 and sin(pi/2 + q) is cos(q), so that constants are folded. A constant within
-    rounding errors of a multiple of pi/2 is set to the multiple.
+    Multiples of 90 degrees are split off: sin(pi/2) is 1 and sin(pi/2 + q) is cos(q), so that
+    constants are folded. A constant within 1e-14 rad of a multiple of pi/2 is set to the multiple.
     """
     constant, rest = _split(angle)
     quarters = round(constant / _QUARTER)
@@ -210,7 +239,10 @@ def sin_cos(angle: SX) -> tuple[SX, SX]:
 
 
 def _split(angle: SX) -> tuple[float, SX]:
-    """Split an angle into a number and an expression without constant term."""
+    """Split a scalar angle into a number and an expression without constant term.
+
+    Their sum is the angle.
+    """
     if angle.is_constant():
         return float(angle), SX(0)
     if angle.is_op(casadi.OP_ADD) or angle.is_op(casadi.OP_SUB):

@@ -42,13 +42,13 @@ def motion(system, duration=3.0, tolerance=1e-8):
 
 @pytest.mark.parametrize(("count", "balls"), [(20, False), (4, True)])
 def test_sparse_matrices_give_the_bits_of_dense_ones(monkeypatch, count, balls):
-    given, patterns = INTEGRATE._places, []
+    given, patterns = INTEGRATE._sparsity_arrays, []
 
     def seen(pattern):
         patterns.append(given(pattern))
         return patterns[-1]
 
-    monkeypatch.setattr(INTEGRATE, "_places", seen)
+    monkeypatch.setattr(INTEGRATE, "_sparsity_arrays", seen)
     sparse = motion(windows(count, balls=balls), 1.0)
     assert sum(pattern is not None for pattern in patterns) >= 2  # slopes and inertia
     patterns.clear()

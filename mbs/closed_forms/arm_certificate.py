@@ -51,7 +51,14 @@ intersect or are parallel: this is structural and leaves 1e-14."""
 
 
 def complex_candidates(prepared: Prepared, T: Array) -> Complex:
-    """Return complex configurations (m, 6) [rad or m] near which an arm may reach T (4, 4) [m]."""
+    """Return complex configurations (m, 6) near which an arm may reach a pose [rad or m].
+
+    They are approximate; `certified_roots` refines them.
+
+    Args:
+        prepared: arm prepared for the general method.
+        T: (4, 4) target pose [m].
+    """
     prepared = for_poses(prepared, T[None])[0][0]
     loop = prepared.arrangement
     ways = loop.all_ways(T[None])
@@ -75,7 +82,10 @@ def complex_candidates(prepared: Prepared, T: Array) -> Complex:
 
 
 def _completed(ways: Array, loop: Arrangement, middle: Complex) -> Complex:
-    """Return arm configurations (m, 6) for positions (n, 3) of joints 3, 4 and 5 of its loop."""
+    """Return arm configurations (m, 6) for positions (n, 3) of joints 3, 4 and 5 of its loop.
+
+    `ways` (6, 4, 4) are the constant transforms of the loop.
+    """
     beyond, goal = np.tile(ways[1].astype(np.complex128), (len(middle), 1, 1)), inverse(ways[5])
     for k in (2, 3, 4):
         beyond = beyond @ motion(middle[:, k - 2], bool(loop.prismatic[k])) @ ways[k]
@@ -92,7 +102,7 @@ def _completed(ways: Array, loop: Arrangement, middle: Complex) -> Complex:
 
 
 def _angle(c: Complex, s: Complex) -> Complex:
-    """Return the complex angle whose cosine and sine are c and s, up to one factor."""
+    """Return the complex angle whose cosine and sine are c and s times one common factor."""
     q: Complex = -0.5j * np.log((c + 1j * s) / (c - 1j * s))
     # half the logarithm of a square is unique up to pi: the sign of the cosine decides
     size = np.where(np.abs(np.cos(q)) > np.abs(np.sin(q)), c / np.cos(q), s / np.sin(q))
@@ -100,7 +110,7 @@ def _angle(c: Complex, s: Complex) -> Complex:
 
 
 def _first(prismatic: bool, near: Complex, goal: Array) -> Complex:
-    """Return positions (n,) of joint 1 that move the origin and z axis of `near` to the goal."""
+    """Return positions (n,) of joint 1 that move origin and z axis of poses `near` to `goal`."""
     if prismatic:
         slide: Complex = goal[2, 3] - near[:, 2, 3]
         return slide
@@ -114,7 +124,11 @@ def _first(prismatic: bool, near: Complex, goal: Array) -> Complex:
 def _second(
     way: Array, prismatic: NDArray[np.bool_], beyond: Complex, goal: Array
 ) -> tuple[NDArray[np.int64], Complex]:
-    """Return row indices and positions of joint 2: two per row if only one equation exists."""
+    """Return row indices and positions of joint 2, for poses `beyond` (n, 4, 4) that it moves.
+
+    `way` is the transform from joint 1 to joint 2, `goal` the target pose. A row has two positions
+    if only one equation exists.
+    """
     kept = KEPT_BY_SLIDE if prismatic[0] else KEPT_BY_TURN
     moved = np.einsum("iab,nb->nai", motion_parts(bool(prismatic[1])), pair(beyond))
     A = (rho(way) @ moved)[:, kept]
@@ -131,7 +145,7 @@ def _second(
 
 
 def _crossings(prismatic: bool, n: Complex, g: Complex) -> tuple[Complex, Complex]:
-    """Return both roots of n0 r + n1 r^2 = g, or of n0 cos q + n1 sin q = g."""
+    """Return both roots q of n0 cos q + n1 sin q = g, or of n0 q + n1 q^2 = g if prismatic."""
     if not prismatic:
         # (n0 - i n1) z^2 - 2 g z + n0 + i n1 = 0 with z = e^(i q)
         root, below = np.sqrt(g**2 - n[:, 0] ** 2 - n[:, 1] ** 2), n[:, 0] - 1j * n[:, 1]
@@ -180,7 +194,7 @@ class CertifiedRoots:
 
 
 def certified_roots(arm: Arm, T: Array, candidates: Complex) -> CertifiedRoots:
-    """Return the certified roots near candidates, each once.
+    """Return the roots of the pose equations that are certified to lie near candidates, each once.
 
     For a change d of a configuration, X = e^(S4 d4) e^(S5 d5) e^(S6 d6) X0 e^(S1 d1) e^(S2 d2)
     e^(S3 d3), where S are the joint twists relative to the middle of the arm. The second derivative
@@ -221,7 +235,7 @@ def certified_roots(arm: Arm, T: Array, candidates: Complex) -> CertifiedRoots:
 
 
 def _inner(arm: Arm, T: Array, length: float) -> tuple[Arm, Array]:
-    """Return the arm between its first and last joint, with lengths divided, and its target."""
+    """Return the arm from its first to its last joint, and its target, in units of `length`."""
     first, last = inverse(arm.gaps[0]), inverse(arm.gaps[-1])
     gaps, target = arm.gaps.copy(), first @ T @ last
     gaps[0], gaps[-1] = np.eye(4), np.eye(4)
@@ -233,7 +247,8 @@ def _inner(arm: Arm, T: Array, length: float) -> tuple[Arm, Array]:
 def _rows(arm: Arm, target: Array, q: Complex) -> tuple[Complex, Complex, Array, Array]:
     """Return equations (m, 6), derivatives (m, 6, 6), norms of twists (m, 6), and |X - 1| (m,).
 
-    The reference is the middle of the arm, where complex angles increase the twists least.
+    X is the pose error at q (m, 6). The reference is the middle of the arm, where complex angles
+    increase the twists least.
     """
     moved = [motion(q[:, k], bool(prismatic)) for k, prismatic in enumerate(arm.prismatic)]
     half = moved[0] @ arm.gaps[1] @ moved[1] @ arm.gaps[2] @ moved[2] @ arm.gaps[3]
@@ -266,7 +281,7 @@ def _skew(axis: Complex) -> Complex:
 
 
 def _six(X: Complex) -> Complex:
-    """Return the positions of matrices (..., 4, 4) and the skew parts of rotations, (..., 6)."""
+    """Return positions and skew parts of rotations (..., 6) of matrices X (..., 4, 4)."""
     R = X[..., :3, :3]
     turned = [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]]
     return np.concatenate([X[..., :3, 3], 0.5 * np.stack(turned, axis=-1)], axis=-1)
@@ -294,7 +309,13 @@ class CertifiedArm:
 
 
 def certified_arm(arm: General) -> CertifiedArm:
-    """Return the prepared arm with the largest number of certified roots at random poses."""
+    """Return a prepared arm with its number of complex configurations.
+
+    It is the largest number of certified roots at some random poses.
+
+    Args:
+        arm: arm prepared for the general method.
+    """
     q = random_configurations(arm.arm, np.eye(4), _POSES, _SEED)
     return CertifiedArm(
         arm,
@@ -321,7 +342,12 @@ class Configurations:
 
 
 def certified_configurations(arm: CertifiedArm, T: Array) -> Configurations:
-    """Return the real configurations of a pose T (4, 4) [m], with their certificate."""
+    """Return the real configurations that reach a pose, with a certificate of completeness.
+
+    Args:
+        arm: prepared arm with its number of complex configurations.
+        T: (4, 4) target pose [m].
+    """
     own, found = arm.general.arm, general(arm.general, T)
     candidates = np.concatenate([complex_candidates(arm.general.prepared, T), found])
     roots = certified_roots(own, T, candidates)

@@ -71,7 +71,7 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
 
 
 class _ArmStruct(ctypes.Structure):
-    """C structure `arm` of arm.h, with the numbers of an `Arm`."""
+    """C structure `arm` of arm.h: joints and constant transforms of an `Arm`."""
 
     _fields_ = (
         ("n", ctypes.c_int),
@@ -82,7 +82,10 @@ class _ArmStruct(ctypes.Structure):
 
 
 def core_of(arm: Arm) -> ctypes.CDLL:
-    """Return the run-time library for an arm.
+    """Return the run-time library, after a check of the number of joints of the arm.
+
+    Args:
+        arm: arm of at most 64 joints.
 
     Raises:
         ModelError: the arm has too many joints.
@@ -97,12 +100,16 @@ def core_of(arm: Arm) -> ctypes.CDLL:
 
 
 def path_of(library: ctypes.CDLL) -> Path:
-    """Return the path of the file of a loaded library."""
+    """Return the path of the file from which a library was loaded.
+
+    Args:
+        library: library loaded by ctypes.
+    """
     return Path(library._name)
 
 
 def _files(sources: tuple[str, ...]) -> dict[str, str]:
-    """Return the C files and headers of `_PAIRS` and other C files, as text by name."""
+    """Return the texts of the C files `sources` and of all files that they need, by name."""
     return core_files([*(name + end for name in _PAIRS for end in (".c", ".h")), *sources])
 
 
@@ -117,7 +124,11 @@ def core() -> ctypes.CDLL:
 
 
 def library_at(path: str) -> ctypes.CDLL:
-    """Return the run-time library in a file, with the signatures of its arm functions."""
+    """Load the run-time library from a file and set the signatures of its arm functions.
+
+    Args:
+        path: path of the shared library.
+    """
     library = ctypes.CDLL(path)
     for name, (result, arguments) in _SIGNATURES.items():
         function = getattr(library, name)
@@ -126,7 +137,7 @@ def library_at(path: str) -> ctypes.CDLL:
 
 
 def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
-    """Return polished configurations (m, n) and their residuals (m,) [m or 1].
+    """Return configurations refined by Newton's method (m, n), and their residuals (m,) [m or 1].
 
     Args:
         library: run-time library.
@@ -145,7 +156,18 @@ def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Arr
 def found_by(
     library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int
 ) -> tuple[Array, Hits]:
-    """Return solutions (m, n) of multi-start Levenberg-Marquardt, and starts for each (m,)."""
+    """Return solutions of multi-start Levenberg-Marquardt from random configurations.
+
+    Args:
+        library: run-time library.
+        arm: arm of the configurations.
+        T: (4, 4) target pose [m].
+        starts: number of random configurations.
+        seed: seed of the random numbers.
+
+    Returns:
+        (m, n) distinct solutions [rad or m], and (m,) number of starts that converged to each.
+    """
     target = _wanted(T, 4, 4)
     q, residual, hits = _rooms(starts, arm.size)
     handed = handed_of(arm)
@@ -156,7 +178,14 @@ def found_by(
 
 
 def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Hits]:
-    """Return the distinct configurations of q (m, n), and the number of copies of each."""
+    """Return the distinct configurations among solutions of one pose, and the copies of each (m,).
+
+    Args:
+        library: run-time library.
+        arm: arm of the configurations.
+        T: (4, 4) target pose [m].
+        q: (m, n) solutions [rad or m].
+    """
     target = _wanted(T, 4, 4)
     own, residual, hits = _rooms(len(q), arm.size)
     own[:] = q
@@ -168,7 +197,15 @@ def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array
 
 
 def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int) -> Array:
-    """Return the configuration (n,) whose pose is nearest to T, from random starts."""
+    """Return the configuration (n,) whose pose is nearest to a target, from random starts.
+
+    Args:
+        library: run-time library.
+        arm: arm of the configurations.
+        T: (4, 4) target pose [m].
+        starts: number of random configurations.
+        seed: seed of the random numbers.
+    """
     target, q = _wanted(T, 4, 4), np.empty(arm.size)
     handed = handed_of(arm)
     library.mbs_nearest(handed.address, _at(target), starts, seed, _at(q))
@@ -176,7 +213,14 @@ def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int)
 
 
 def singular_by(library: ctypes.CDLL, arm: Arm, q: Array, bound: float) -> NDArray[np.bool_]:
-    """Return whether each configuration of q (m, n) has a singular value below a bound (m,)."""
+    """Return a mask (m,) of the configurations whose Jacobian has a singular value below a bound.
+
+    Args:
+        library: run-time library.
+        arm: arm of the configurations.
+        q: (m, n) configurations [rad or m].
+        bound: bound of the singular value, with lengths in arm lengths.
+    """
     own, singular = _wanted(q, len(q), arm.size), np.empty(len(q), dtype=bool)
     handed = handed_of(arm)
     library.mbs_singular(handed.address, bound, len(q), _at(own), singular.ctypes.data)
@@ -186,7 +230,10 @@ def singular_by(library: ctypes.CDLL, arm: Arm, q: Array, bound: float) -> NDArr
 def corrected_by(
     library: ctypes.CDLL, arm: Arm, T: Array, x: Array, held: Array, value: Array, iterations: int
 ) -> Array:
-    """Return solutions (m, n) near x = q / unit (m, n), with the constraint held . x = value.
+    """Return solutions (m, n) near first guesses that also satisfy a linear constraint.
+
+    Unknowns are x = q / unit, with the unit of each joint: 1 rad or the length of the arm. The
+    constraint is held . x = value.
 
     Args:
         library: run-time library.
@@ -209,7 +256,14 @@ def corrected_by(
 
 
 def residual_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> Array:
-    """Return the largest element of |pose(q) - T| (m,), T (4, 4) or (m, 4, 4), at q (m, n)."""
+    """Return the largest element of |pose(q) - T| (m,) [m or 1].
+
+    Args:
+        library: run-time library.
+        arm: arm of the configurations.
+        T: (4, 4) target pose of all, or (m, 4, 4) of each.
+        q: (m, n) configurations [rad or m].
+    """
     own, target, residual = _wanted(q, *q.shape), _targets(T, len(q)), np.empty(len(q))
     handed = handed_of(arm)
     stride = 16 if target.ndim == 3 else 0
@@ -218,7 +272,16 @@ def residual_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> Array:
 
 
 def examined_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
-    """Return gaps to T (m, 6) and Jacobians (m, 6, n) at q (m, n), lengths in arm lengths."""
+    """Return displacements (m, 6) to target poses and Jacobians (m, 6, n), lengths in arm lengths.
+
+    A displacement is a translation and a rotation vector, as of `gap_to`.
+
+    Args:
+        library: run-time library.
+        arm: arm of the configurations.
+        T: (4, 4) target pose of all, or (m, 4, 4) of each.
+        q: (m, n) configurations [rad or m].
+    """
     m, n = q.shape
     own, target = _wanted(q, m, n), _targets(T, m)
     gap, J = np.empty((m, 6)), np.empty((m, n, 6))
@@ -259,7 +322,7 @@ class _ReductionStruct(ctypes.Structure):
 def reduced_by(
     library: ctypes.CDLL, arm: Arm, T: Array, parts: tuple[Array, Array, Array, Array], h: Array
 ) -> tuple[Array, Array, bool]:
-    """Return X (m, n) and g (m, 6 - rank) for h (m, corank), and whether all iterations converged.
+    """Return points of the Lyapunov-Schmidt reduction at a singular configuration.
 
     Args:
         library: run-time library.
@@ -267,7 +330,11 @@ def reduced_by(
         T: (4, 4) target pose.
         parts: reduction at a singular configuration: centre (n,), solved directions of equations
             (rank, 6), remaining directions (6 - rank, 6), null directions of x (corank, n).
-        h: coordinates along the null directions.
+        h: (m, corank) coordinates along the null directions.
+
+    Returns:
+        Configurations x = q / unit (m, n) that satisfy the solved equations, values (m, 6 - rank)
+        of the remaining equations, and whether all iterations converged.
     """
     count, corank = h.shape
     held = [np.ascontiguousarray(part, dtype=float) for part in parts]
@@ -319,7 +386,12 @@ def walked_by(
 
 
 def rounded_by(library: ctypes.CDLL, T: Array) -> Array | None:
-    """Return the rigid transform nearest to T (4, 4); None if T is not rigid within 1e-6."""
+    """Return the rigid transform (4, 4) nearest to a matrix; None if it is not rigid within 1e-6.
+
+    Args:
+        library: run-time library.
+        T: (4, 4) matrix.
+    """
     own = np.array(T, dtype=float, order="C")
     return own if library.mbs_round(_at(own)) else None
 
@@ -363,7 +435,11 @@ def settled_by(
 
 
 class CArm:
-    """C structure of an arm, and the arrays that it points to."""
+    """C structure of an arm, and the arrays that it points to.
+
+    Attributes:
+        address: memory address of the structure.
+    """
 
     def __init__(self, arm: Arm) -> None:
         self.gaps = np.ascontiguousarray(arm.gaps, dtype=float)
@@ -374,29 +450,36 @@ class CArm:
 
 @functools.lru_cache(maxsize=256)
 def handed_of(arm: Arm) -> CArm:
-    """Return the C structure of an arm, cached, because an arm is immutable."""
+    """Return the C structure of an arm, cached, because an arm is immutable.
+
+    Args:
+        arm: numeric arm.
+    """
     return CArm(arm)
 
 
 def _wanted(T: Array, *shape: int) -> Array:
-    """Return a C-contiguous double array of a shape; a wrong shape raises, to protect C code."""
+    """Return T as a C-contiguous array of doubles of this shape, for a C function.
+
+    Raises ValueError if T cannot be broadcast to the shape, since C code does not check it.
+    """
     if type(T) is np.ndarray and T.shape == shape and T.dtype == np.float64:
         return T if T.flags.c_contiguous else np.ascontiguousarray(T)
     return np.ascontiguousarray(np.broadcast_to(np.asarray(T, dtype=float), shape))
 
 
 def _targets(T: Array, count: int) -> Array:
-    """Return one target pose for all configurations, or one for each."""
+    """Return target poses as an array for C: (4, 4) for all configurations, or (count, 4, 4)."""
     return _wanted(T, *((4, 4) if np.ndim(T) == 2 else (count, 4, 4)))
 
 
 def _rooms(count: int, n: int) -> tuple[Array, Array, Hits]:
-    """Return empty buffers for `count` solutions of n joints, their residuals and hits."""
+    """Return uninitialised arrays for `count` configurations of n joints, residuals and hits."""
     return np.empty((count, n)), np.empty(count), np.empty(count, dtype=np.int64)
 
 
 def _at(array: Array) -> int:
-    """Return the memory address of an array."""
+    """Return the memory address of the data of an array."""
     return int(array.ctypes.data)
 
 
@@ -412,6 +495,8 @@ _int, _double = ctypes.c_int, ctypes.c_double
 
 
 class _LoopStruct(ctypes.Structure):
+    """C structure `roth_loop` of raghavan_roth.h: an arm prepared for the general method."""
+
     _fields_ = (
         ("order", _int * 6),
         ("sign", _int),
@@ -433,7 +518,12 @@ class _LoopStruct(ctypes.Structure):
 
 
 class HandedLoop:
-    """C structure of a prepared arm, and the arrays that it points to."""
+    """C structure of an arm prepared for the general method, and the arrays that it points to.
+
+    Attributes:
+        address: memory address of the structure.
+        next: structure of an alternative elimination, or None.
+    """
 
     def __init__(self, arm: Arm, prepared: Prepared) -> None:
         loop, pencil = prepared.arrangement, prepared.pencil
@@ -469,7 +559,12 @@ class HandedLoop:
 
 
 def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbers, Array]:
-    """Return the solutions of the general method for poses T (N, 4, 4).
+    """Return the solutions of the general method (Raghavan and Roth) for many poses.
+
+    Args:
+        library: run-time library.
+        handed: arm prepared for the general method.
+        T: (N, 4, 4) target poses [m].
 
     Returns:
         (m,) indices of the poses, ascending, and (m, 6) configurations for them.
@@ -500,7 +595,13 @@ def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbe
 
 
 def candidates_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> Array:
-    """Return configurations (m, 6) that may reach a pose (4, 4), not polished and not checked."""
+    """Return configurations (m, 6) that may reach a pose, neither polished nor checked.
+
+    Args:
+        library: run-time library.
+        handed: arm prepared for the general method.
+        T: (4, 4) target pose [m].
+    """
     target, q = _wanted(T, 4, 4), np.empty((_CANDIDATES, 6))
     return q[: library.mbs_candidates(handed.address, _at(target), _at(q))].copy()
 
@@ -539,7 +640,7 @@ EXPORT int jac_FUNCTION(const double **arg, double **res, long long *iw, double 
 
 
 class SolverStruct(ctypes.Structure):
-    """C structure `pose_solver` of pose.h."""
+    """C structure `pose_solver` of pose.h: inverse geometry of an arm in generated C code."""
 
     _fields_ = (
         *((name, ctypes.c_void_p) for name in ("robot", "loop", "evaluate", "checkout", "release")),
@@ -555,7 +656,7 @@ class SolverStruct(ctypes.Structure):
 def general_function(
     name: str, handed: HandedLoop, indices: Sequence[int], others: Array, nearly: float
 ) -> Function:
-    """Return ``name(T) -> q, valid, count, certain`` with C code, see `pose_all` of pose.h.
+    """Return the Function ``name(T) -> q, valid, count, certain`` of the general method, in C.
 
     Args:
         name: prefix of the name of the function.
@@ -566,6 +667,10 @@ def general_function(
 
     Raises:
         CompilerError: no C compiler was found.
+
+    Returns:
+        Function of the target pose T (4, 4): configurations q (nq, 16), mask valid (16, 1), number
+        count of configurations, and certain, which is 0 if configurations may be missing.
     """
     nq, arm = len(others), handed.arm
     solver = SolverStruct(nearly=nearly, nq=nq)
@@ -599,7 +704,7 @@ def general_function(
 
 
 def _loop_tables(handed: HandedLoop, number: int = 0) -> str:
-    """Return C text of a loop of an arm, after the text of its alternative loops."""
+    """Return the C text of a prepared loop with index `number`, after those of its alternatives."""
     owned, text = dict[str, str](), ""
     if handed.next is not None:
         text += _loop_tables(handed.next, number + 1)
@@ -613,7 +718,10 @@ def _loop_tables(handed: HandedLoop, number: int = 0) -> str:
 
 
 def _initializer(value: Any, owned: Mapping[str, str] = MappingProxyType({})) -> str:
-    """Return the C initializer of numbers or of a structure; its pointers are names or null."""
+    """Return the C initializer of a number, an array or a structure.
+
+    `owned` maps the names of pointers of the structure to C names; other pointers are null.
+    """
     if isinstance(value, ctypes.Structure):
         pairs = [(field[0], field[1]) for field in value._fields_]
         texts = (

@@ -37,7 +37,7 @@ _ROWS = LEGS + 1
 
 
 def _left(a: Complex) -> Complex:
-    """Return the matrices (..., 4, 4) of quaternion products a q for vectors a (..., 3)."""
+    """Return the matrices (..., 4, 4) of the quaternion products a q, for vectors a (..., 3)."""
     x, y, z = np.moveaxis(a, -1, 0)
     o = np.zeros_like(x)
     rows = np.array([[o, -x, -y, -z], [x, o, -z, y], [y, z, o, -x], [z, -y, x, o]])
@@ -69,7 +69,10 @@ class PlatformLegs:
     c: Complex
 
     def forms(self) -> Complex:
-        """Return the symmetric matrices (7, 8, 8) of the equations; the last makes p a vector."""
+        """Return the symmetric matrices Q (7, 8, 8) of the equations x' Q x = 0 of x = (e, g).
+
+        The first six fix the leg lengths. The last one makes the scalar part of p zero.
+        """
         Q = np.zeros((_ROWS, _SIZE, _SIZE), dtype=np.complex128)
         Q[:LEGS, 4:, 4:] = np.eye(4)
         N = _right(self.b) - _left(self.a)
@@ -100,7 +103,7 @@ class Homotopy:
 
     @staticmethod
     def between(start: PlatformLegs, end: PlatformLegs) -> Homotopy:
-        """Return the path along a straight line of a, b and c."""
+        """Return the path along the straight line of a, b and c from `start` to `end`."""
         c = np.append(end.c - start.c, 0)
         first, last = start.forms(), end.forms()
         if np.array_equal(start.a, end.a) and np.array_equal(start.b, end.b):
@@ -110,7 +113,10 @@ class Homotopy:
         return Homotopy(np.array([first, last - first - bend, bend]), c)
 
     def slopes(self, x: Complex, t: Real) -> tuple[Complex, Complex]:
-        """Return derivatives of the rows by x, (r, 7, 8), and by t, (r, 7), at x (r, 8), t (r,)."""
+        """Return the derivatives of the equations by x, (r, 7, 8), and by t, (r, 7).
+
+        x (r, 8) are points and t (r,) path parameters from 0 to 1.
+        """
         Y = (x @ self.Q.reshape(-1, _SIZE).T).reshape(len(x), len(self.Q), _ROWS, _SIZE)
         J, e = Y[:, 0], x[:, :4]
         if len(self.Q) == 1:
@@ -122,12 +128,15 @@ class Homotopy:
 
 
 def _square(J: Complex, patch: Complex) -> Complex:
-    """Append the row `patch` to J, which keeps the length of x constant to first order."""
+    """Append the row `patch` (r, 8) to J (r, 7, 8); it keeps the length of x constant."""
     return np.concatenate([J, patch.conj()[:, None, :]], axis=1)
 
 
 def _correction(path: Homotopy, x: Complex, t: Real, patch: Complex) -> tuple[Complex, Complex]:
-    """Return Newton's step and the tangent dx/dt of a homotopy path, both (r, 8)."""
+    """Return Newton's step and the tangent dx/dt of a homotopy path at x, t, both (r, 8).
+
+    `patch` (r, 8) is normal to both.
+    """
     J, rate = path.slopes(x, t)
     sides = np.zeros((len(x), _SIZE, 2), dtype=np.complex128)
     sides[:, :_ROWS, 0], sides[:, :_ROWS, 1] = np.einsum("rij,rj->ri", J, x) / 2, rate
@@ -136,15 +145,21 @@ def _correction(path: Homotopy, x: Complex, t: Real, patch: Complex) -> tuple[Co
 
 
 def follow(path: Homotopy, x: Complex, tolerance: float = TOLERANCE) -> tuple[Complex, Real]:
-    """Return the ends (r, 8) of homotopy paths from roots x, and the reached t (r,).
+    """Track homotopy paths from their start at t = 0.
 
-    The ends have length one. t is 1 on a path that was followed completely.
+    Args:
+        path: homotopy.
+        x: (r, 8) roots at t = 0.
+        tolerance: largest relative error of a step.
+
+    Returns:
+        (r, 8) ends of length one, and (r,) reached t; 1 on a path that was followed completely.
     """
     return homotopy.follow(functools.partial(_correction, path), x, _in_patch, tolerance)
 
 
 def _in_patch(x: Complex, slope: Complex) -> tuple[Complex, Complex]:
-    """Return roots of length one, and slopes that keep this length to first order."""
+    """Return roots scaled to length one, and slopes that keep this length to first order."""
     size = np.linalg.norm(x, axis=1, keepdims=True)
     x, slope = x / size, slope / size
     return x, slope - np.sum(x.conj() * slope, axis=1, keepdims=True) * x
@@ -177,9 +192,14 @@ class PathEnds:
 
 
 def certify(legs: PlatformLegs, x: Complex, t: Real) -> PathEnds:
-    """Return the refined ends of paths that reached t, and which of them are certified.
+    """Return the ends of paths, refined by Newton's method, with certificates.
 
     Source: Blum, Cucker, Shub & Smale 1998, chapter 8; in floating point, with room for rounding.
+
+    Args:
+        legs: legs at the ends of the paths.
+        x: (r, 8) ends of the paths, changed in place.
+        t: (r,) reached path parameters; ends below 1 are not certified.
     """
     path = Homotopy.between(legs, legs)
     regular = t >= 1
@@ -226,7 +246,11 @@ DEGREE = 40
 
 
 def random_legs(rng: np.random.Generator) -> PlatformLegs:
-    """Return random complex legs about the origin, of about unit size."""
+    """Return six random complex legs whose ends have their means at the origin, of unit size.
+
+    Args:
+        rng: random number generator.
+    """
 
     def drawn(*shape: int) -> Complex:
         z = rng.normal(size=shape) + 1j * rng.normal(size=shape)
@@ -241,11 +265,11 @@ def _centred(legs: PlatformLegs) -> PlatformLegs:
 
 
 def monodromy(seed: int, most: int = 200) -> StartSystem:
-    """Return roots of random legs, by tracking known roots along closed paths of other legs.
+    """Return all roots of random legs, by tracking known roots along closed paths of other legs.
 
     Args:
         seed: seed of the random numbers.
-        most: maximum number of closed paths.
+        most: maximum number of closed paths. Fewer than 40 roots may be found.
     """
     rng = np.random.default_rng(seed)
     legs = random_legs(rng)
@@ -273,14 +297,22 @@ def monodromy(seed: int, most: int = 200) -> StartSystem:
 
 
 def text_of(start: StartSystem) -> str:
-    """Return the values of a start as JSON text for a file."""
+    """Return a platform and its roots as JSON text for a file, which `kept_start` reads.
+
+    Args:
+        start: platform and roots.
+    """
     parts = {"a": start.legs.a, "b": start.legs.b, "c": start.legs.c, "x": start.x}
     return json.dumps({name: [z.real.tolist(), z.imag.tolist()] for name, z in parts.items()})
 
 
 @functools.cache
 def kept_start(number: int) -> StartSystem:
-    """Return one of the two starts that are stored next to this file."""
+    """Return a platform with its forty roots from a file of this package.
+
+    Args:
+        number: 0 or 1, the index of the file.
+    """
     file = resources.files("mbs.closed_forms") / "hexapod_starts" / f"{number}.json"
     told = json.loads(file.read_text(encoding="utf-8"))
     parts = {name: np.array(told[name][0]) + 1j * np.array(told[name][1]) for name in "abcx"}
@@ -290,11 +322,11 @@ def kept_start(number: int) -> StartSystem:
 
 @functools.lru_cache(maxsize=16)
 def own_start(a: bytes, b: bytes) -> StartSystem:
-    """Return all roots of a platform with complex leg lengths, the start for any other lengths.
+    """Return all roots of a platform for random complex leg lengths, as start for any lengths.
 
     Special ends of the legs have fewer than forty roots: 28 for semi-regular hexagons, 16 for legs
     that meet in pairs. The roots are regular, because lengths with singular roots form no open set.
-    Both stored starts must lead to the same roots. If they do not, monodromy around other lengths
+    Both stored starts must give the same roots. If they do not, monodromy around other lengths
     is repeated until three closed paths find no new root.
 
     Args:
@@ -328,12 +360,12 @@ _IDLE = 3
 
 
 def _lengths(rng: np.random.Generator) -> Complex:
-    """Return random complex constants c (6,) of `Legs`."""
+    """Return random complex constants c (6,) of `PlatformLegs`, which determine leg lengths."""
     return rng.normal(size=LEGS) + 1j * rng.normal(size=LEGS)
 
 
 def _distinct_roots(legs: PlatformLegs, x: Complex) -> Complex:
-    """Return the certified regular roots among x, each once."""
+    """Return the roots among x (r, 8) that are certified as regular, each once."""
     ends = certify(legs, x.copy(), np.ones(len(x)))
     return ends.x[ends.regular]
 
@@ -388,7 +420,7 @@ class Poses:
 
 
 def poses(a: Real, b: Real, length: Real) -> Poses:
-    """Return all poses in which six legs have given lengths.
+    """Return all poses of a platform in which six legs have given lengths.
 
     Args:
         a: (6, 3) ends of the legs on the ground [m].
@@ -396,7 +428,7 @@ def poses(a: Real, b: Real, length: Real) -> Poses:
         length: (6,) lengths of the legs [m].
 
     Raises:
-        LoopError: the legs hold the platform at no pose.
+        LoopError: the platform can move for constant leg lengths at every pose.
     """
     middle, own, size = a.mean(axis=0), b.mean(axis=0), _size(a, b)
     a0, b0 = (a - middle) / size, (b - own) / size
@@ -425,7 +457,7 @@ def poses(a: Real, b: Real, length: Real) -> Poses:
 
 
 def _rotations(e: Real) -> Real:
-    """Return the rotation matrices (..., 3, 3) of unit quaternions e (r, 4), scalar part first."""
+    """Return the rotation matrices (r, 3, 3) of unit quaternions e (r, 4), scalar part first."""
     w, x, y, z = e.T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -436,19 +468,27 @@ def _rotations(e: Real) -> Real:
 
 
 def _slopes(a: Real, b: Real, e: Real, p: Real) -> tuple[Real, Real]:
-    """Return squared lengths (r, 6), and half their derivatives by [p; rotation], (r, 6, 6)."""
+    """Return squared leg lengths (r, 6), and half their derivatives by [p; rotation], (r, 6, 6).
+
+    a, b (6, 3) are the leg ends, e (r, 4) and p (r, 3) the poses of the platform.
+    """
     arm = np.einsum("rij,kj->rki", _rotations(e), b)
     way = p[:, None, :] + arm - a
     return np.sum(way**2, axis=2), np.concatenate([way, np.cross(arm, way)], axis=2)
 
 
 def _size(a: Real, b: Real) -> float:
-    """Return the root mean square distance of the leg ends from their means [m]; 1 if it is 0."""
+    """Return the root mean square distance of leg ends a, b (6, 3) from their means [m].
+
+    1 if it is zero.
+    """
     return float(np.sqrt(np.mean(np.var(a, axis=0)) + np.mean(np.var(b, axis=0)))) or 1.0
 
 
 def holds(a: Real, b: Real) -> bool:
-    """Whether six legs of suitable lengths hold a platform at some pose.
+    """Whether six legs determine the pose of the platform locally at a generic pose.
+
+    False if the platform can move for constant leg lengths at every pose.
 
     Args:
         a: (6, 3) ends of the legs on the ground [m].
@@ -463,7 +503,7 @@ def holds(a: Real, b: Real) -> bool:
 
 
 class _RealRoots(NamedTuple):
-    """Quaternions (r, 4), positions (r, 3) in sizes, and the number of roots at folds."""
+    """Real roots: quaternions e (r, 4), positions p (r, 3) in sizes, and number of double roots."""
 
     e: Real
     p: Real
@@ -471,7 +511,10 @@ class _RealRoots(NamedTuple):
 
 
 def _real(a: Real, b: Real, square: Real, ends: PathEnds, t: Real) -> _RealRoots:
-    """Return the real roots among the ends of paths that reached t (r,)."""
+    """Return the real roots among the ends of paths that reached t (r,).
+
+    a, b (6, 3) are the leg ends, `square` (6,) the squared lengths, all in sizes of the platform.
+    """
     near = t > 1 - _FOLD
     near &= np.linalg.norm(ends.x[:, :4], axis=1) > _FLAT**0.5
     order = np.argsort(~ends.regular[near], kind="stable")
@@ -495,13 +538,13 @@ def _real(a: Real, b: Real, square: Real, ends: PathEnds, t: Real) -> _RealRoots
 
 
 def _is_same(e: Real, p: Real, other_e: Real, other_p: Real) -> bool:
-    """Whether two poses are equal; quaternions e and -e are the same orientation."""
+    """Whether the poses (e, p) and (other_e, other_p) are equal; e and -e are one orientation."""
     turn = min(np.max(np.abs(e - other_e)), np.max(np.abs(e + other_e)))
     return bool(max(turn, np.max(np.abs(p - other_p))) < _SAME)
 
 
 def _refined(a: Real, b: Real, square: Real, e: Real, p: Real) -> tuple[Real, Real, Real]:
-    """Refine real poses by Newton's method; return e, p, largest errors of squared lengths (r,).
+    """Refine real poses by Newton's method; return e, p, and errors of squared lengths (r,).
 
     Steps without improvement are halved, because their length has no bound at a fold.
     """

@@ -36,7 +36,7 @@ from mbs.spatial import Pose, axis_rotation, vector
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PieperLoop:
-    """Loop in the arrangement that Pieper's method requires.
+    """Loop started and directed so that Pieper's method applies.
 
     Attributes:
         problem: problem to be solved.
@@ -67,7 +67,7 @@ class PieperLoop:
         return self.ring.joints[k].displacement(self.x(k))
 
     def suffix(self, k: int) -> str:
-        """Return the suffix of the names of the coefficients of joint k: its number."""
+        """Return suffix, a number, of the names of the coefficients in the equation of joint k."""
         joints = self.problem.ring.joints
         digits = ["".join(c for c in joint.name if c.isdigit()) for joint in joints]
         number = joints.index(self._named(k))
@@ -75,17 +75,24 @@ class PieperLoop:
         return digits[number] if distinct else str(number + 1)
 
     def _named(self, k: int) -> ChainJoint:
-        """Return the joint of the original loop with the name of joint k."""
+        """Return the joint of the original loop that is joint k of this loop chain."""
         name = self.ring.joints[k].name
         return next(joint for joint in self.problem.ring.joints if joint.name == name)
 
     def zero(self, values: SX) -> bool:
-        """Whether dimensionless values are zero in all closed configurations."""
+        """Whether dimensionless expressions are zero in all closed configurations."""
         return self.problem.always_zero(values)
 
 
 def basis(scene: PieperLoop, k: int) -> SX:
-    """Return the functions (3, 1) that the coefficients of a form in joint k multiply."""
+    """Return the functions (3, 1) that the three coefficients of a form in a joint multiply.
+
+    They are cos q, sin q, 1 for a revolute joint and r^2, r, 1 for a prismatic joint.
+
+    Args:
+        scene: loop with the joint.
+        k: index of the joint in the loop chain.
+    """
     x = scene.x(k)
     if scene.ring.joints[k].is_rotational:
         return casadi.vertcat(casadi.cos(x), casadi.sin(x), 1)
@@ -93,7 +100,15 @@ def basis(scene: PieperLoop, k: int) -> SX:
 
 
 def moved_point(joint: ChainJoint, point: SX) -> SX:
-    """Return the forms (3, 3) of the coordinates of a point that the joint moves."""
+    """Return the coordinates of a point after the motion of a joint, as forms.
+
+    Args:
+        joint: revolute or prismatic joint.
+        point: (3, 1) point in the frame after the joint [m].
+
+    Returns:
+        (3, 3) coefficients of the functions `basis`, one row per coordinate.
+    """
     x, y, z, sign = point[0], point[1], point[2], joint.sign
     if joint.is_rotational:
         return casadi.vertcat(
@@ -105,12 +120,21 @@ def moved_point(joint: ChainJoint, point: SX) -> SX:
 
 
 def constant(value: SX) -> SX:
-    """Return the form of a quantity that does not depend on the joint."""
+    """Return the form (3, 1) of a quantity that does not depend on the joint.
+
+    Args:
+        value: scalar expression.
+    """
     return casadi.vertcat(0, 0, value)
 
 
 def product(a: SX, b: SX) -> SX:
-    """Return the symmetric matrix (3, 3) of the product of two forms."""
+    """Return the product of two forms as a symmetric matrix A (3, 3), with b^T A b for b = `basis`.
+
+    Args:
+        a: (3, 1) coefficients of the first form.
+        b: (3, 1) coefficients of the second form.
+    """
     outer = casadi.mtimes(a, b.T)
     return SX((outer + outer.T) / 2)
 
@@ -147,12 +171,15 @@ def three_angle_steps(
 
 
 def _axis_rotation(scene: PieperLoop, k: int) -> SX:
-    """Return the rotation matrix (3, 3) of joint k about its z axis."""
+    """Return the rotation matrix (3, 3) of joint k about its z axis, at its symbolic position."""
     return SX(axis_rotation("z", scene.ring.joints[k].sign * scene.x(k)).matrix)
 
 
 def _middle(scene: PieperLoop, k: int, row: SX, column: SX, G: SX) -> SequenceStep:
-    """Return the step of the joint in the middle, from row^T Z column = G_zz."""
+    """Return the step of joint k, the middle one of three, from row^T Z column = G_zz.
+
+    Z is the rotation of the joint, G (3, 3) the rotation of the three joints.
+    """
     joint = scene.ring.joints[k]
     sign = SX.sym(joint.name)
     X = row[0] * column[0] + row[1] * column[1]
@@ -173,14 +200,18 @@ def _middle(scene: PieperLoop, k: int, row: SX, column: SX, G: SX) -> SequenceSt
 
 
 def _square_angle(X: SX, Y: SX, Z: SX, sign: SX, G: SX) -> Root:
-    """Return the root for perpendicular neighbours: X^2 + Y^2 = 1 and Z^2 + W^2 = 1."""
+    """Return the root of X cos q + Y sin q = Z for X^2 + Y^2 = 1.
+
+    The other component, W with Z^2 + W^2 = 1, follows from the rotation G (3, 3). Its sign is
+    `sign`.
+    """
     W = sign * casadi.sqrt(G[0, 2] * G[0, 2] + G[1, 2] * G[1, 2])
     angle = casadi.atan2(Y * Z + X * W, X * Z - Y * W)
     return Root(SX(angle), SX(1), SX(1))
 
 
 def _outer(scene: PieperLoop, k: int, start: SX, end: SX) -> SequenceStep:
-    """Return the step of joint k, which rotates the vector `start` (2, 1) onto `end`."""
+    """Return step of joint k, which rotates the plane vector `start` (2, 1) onto `end` (2, 1)."""
     return angle_step(scene, k, (start, end), 1.0)
 
 
@@ -290,7 +321,10 @@ def linear(
 
 
 def _polynomial(scene: PieperLoop, k: int, factors: list[SX], unit: SX) -> SequenceStep | None:
-    """Return the step of a prismatic joint from a polynomial, highest power first, or None."""
+    """Return the step of a prismatic joint from a polynomial; None if it has degree zero.
+
+    `factors` are the coefficients, highest power first; `unit` is the typical size of its terms.
+    """
     degree = len(factors) - 1
     while degree and scene.zero(factors[0] * scene.length**degree / unit):
         factors, degree = factors[1:], degree - 1
@@ -315,7 +349,10 @@ def _polynomial(scene: PieperLoop, k: int, factors: list[SX], unit: SX) -> Seque
 
 
 def _polynomial_text(names: list[str], r: str) -> str:
-    """Return the text of the equation, such as "A3 r3^2 + B3 r3 + C3 = 0"."""
+    """Return the text of a polynomial equation in r, such as "A3 r3^2 + B3 r3 + C3 = 0".
+
+    `names` are those of the coefficients, highest power first.
+    """
     powers = [f" {r}^{k}" if k > 1 else f" {r}" for k in range(len(names) - 1, 0, -1)]
     return (
         " + ".join(f"{name}{power}" for name, power in zip(names, [*powers, ""], strict=True))
@@ -324,7 +361,10 @@ def _polynomial_text(names: list[str], r: str) -> str:
 
 
 def _quadratic_root(factors: list[SX], sign: SX, length: SX, unit: SX) -> Root:
-    """Return the root of a r^2 + b r + c on one side of the mean of the roots, finite for any a."""
+    """Return the root of a r^2 + b r + c = 0 on the side `sign` of the mean of both roots.
+
+    `factors` are a, b, c. It is finite for any a.
+    """
     a, b, c = factors[0] * length**2 / unit, factors[1] * length / unit, factors[2] / unit
     inverse = a / (a * a + _SMALL)
     middle = -b * inverse / 2
@@ -381,19 +421,22 @@ def three_joints(scene: PieperLoop, point: SX, p: SX) -> list[SequenceStep] | No
 
 
 def _square(f: SX, t: SX, point: SX) -> SX:
-    """Return the form of |f|^2 for a revolute joint 3."""
+    """Return the form (3, 1) of |f|^2 for a revolute joint 3, with f = t plus the rotated point."""
     middle = 2 * casadi.mtimes(f.T, t)
     return SX(middle + constant(casadi.sumsqr(point) - casadi.sumsqr(t)))
 
 
 def _slid_square(f: SX) -> SX:
-    """Return the form of |f|^2 for a prismatic joint 3."""
+    """Return the form (3, 1) of |f|^2 for a prismatic joint 3, from the forms f (3, 3)."""
     u, v = f[:, 1], f[:, 2]
     return casadi.vertcat(casadi.sumsqr(u), 2 * casadi.dot(u, v), casadi.sumsqr(v))
 
 
 def _rows(reach: PointTarget) -> tuple[list[SX], list[SX], list[SX]]:
-    """Return two equations a . (J2 f) = h: vectors a, forms h, and the units of h."""
+    """Return two equations a . (J2 f) = h that do not depend on joint 1.
+
+    They are vectors a (3, 1), forms h (3, 1) in joint 3, and the typical sizes of h.
+    """
     scene, R, t = reach.scene, reach.way.R, reach.way.p
     if not scene.ring.joints[0].is_rotational:
         rows = [R[k, :].T for k in (0, 1)]
@@ -405,7 +448,7 @@ def _rows(reach: PointTarget) -> tuple[list[SX], list[SX], list[SX]]:
 
 
 def _second_revolute(reach: PointTarget) -> list[SequenceStep] | None:
-    """Return the steps of joints 3 and 2 for a revolute joint 2."""
+    """Return the steps of joints 3 and 2 for a revolute joint 2; None if they are undetermined."""
     scene = reach.scene
     (a, b), (h, k), (unit_h, unit_k) = _rows(reach)
     Z1, Z2 = h - a[2] * reach.f[2, :].T, k - b[2] * reach.f[2, :].T
@@ -429,7 +472,11 @@ def _second_revolute(reach: PointTarget) -> list[SequenceStep] | None:
 def _parallel(
     reach: PointTarget, first: tuple[SX, SX, SX], second: tuple[SX, SX, SX]
 ) -> list[SequenceStep] | None:
-    """Return steps of joints 3 and 2 if both equations have proportional terms in joint 2."""
+    """Return the steps of joints 3 and 2 if both equations have proportional terms in joint 2.
+
+    `first` and `second` are vector, form and typical size of an equation. None if they are
+    undetermined.
+    """
     scene, (a, Z1, unit), (b, Z2, unit_b) = reach.scene, first, second
     if scene.zero(b[:2] * scene.length / unit_b):
         if scene.zero(a[:2] * scene.length / unit):
@@ -452,7 +499,7 @@ def _parallel(
 
 
 def _second_prismatic(reach: PointTarget) -> list[SequenceStep] | None:
-    """Return the steps of joints 3 and 2 for a prismatic joint 2."""
+    """Return the steps of joints 3 and 2 for a prismatic joint 2; None if they are undetermined."""
     rows, forms, _ = _rows(reach)
     left = [h - casadi.mtimes(reach.f.T, a) for a, h in zip(rows, forms, strict=True)]
     if reach.scene.ring.joints[0].is_rotational:
@@ -479,6 +526,7 @@ def _slide_in_turn(
     """Return the steps of joints 3 and 2 for a revolute joint 1 and a prismatic joint 2.
 
     With the displacement r of joint 2: r^2 / 2 + (f_z + a_z) r = left[0] and along r = left[1].
+    None if they are undetermined.
     """
     scene, sign = reach.scene, reach.scene.ring.joints[1].sign
     height, b3 = reach.f[2, :].T + constant(a[2]), basis(scene, 2)
@@ -496,7 +544,7 @@ def _slide_in_turn(
 
 
 def _first(reach: PointTarget) -> SequenceStep:
-    """Return the step of joint 1, with the other two joints known."""
+    """Return the step of joint 1 once joints 2 and 3 are known."""
     scene = reach.scene
     f = Pose.translation(casadi.mtimes(reach.f, basis(scene, 2)))
     w = (reach.way @ scene.motion(1) @ f).p
@@ -517,6 +565,9 @@ def three_displacements(scene: PieperLoop) -> list[SequenceStep]:
 
     Raises:
         NoClosedForm: two revolute axes are always parallel, or the prismatic axes are coplanar.
+
+    Args:
+        scene: loop with these joints.
     """
     revolute = scene.ring
     for k in reversed([k for k, joint in enumerate(revolute.joints) if not joint.is_rotational]):
@@ -567,13 +618,19 @@ def _cross(M: SX, k: int) -> SX:
 
 
 def _named(M: SX, p: SX, ends: list[str]) -> dict[str, SX]:
-    """Return the elements of M and p as named coefficients X, Y, Z of each joint end."""
+    """Return the elements of M (3, 3) and p (3, 1) as coefficients by name: X, Y, Z plus a suffix.
+
+    `ends` are the suffixes of the three prismatic joints.
+    """
     named = {f"{axis}{end}": M[m, k] for k, end in enumerate(ends) for m, axis in enumerate("XYZ")}
     return named | {f"{axis}0": p[m] for m, axis in enumerate("XYZ")}
 
 
 def _text(scene: PieperLoop, indices: list[int], ends: list[str]) -> str:
-    """Return the three equations of the displacements of prismatic joints as text."""
+    """Return the three linear equations of the displacements as text.
+
+    `indices` are those of the prismatic joints, `ends` the suffixes of their coefficients.
+    """
     names = [scene.ring.joints[k].name for k in indices]
     rows = (
         " + ".join(f"{axis}{end} {name}" for end, name in zip(ends, names, strict=True))
@@ -630,7 +687,10 @@ def _cost(sequence: StepSequence) -> tuple[int, int]:
 
 
 def _steps(scene: PieperLoop) -> list[SequenceStep] | None:
-    """Return steps for a loop whose last three axes intersect; None if there is no solution."""
+    """Return the steps of a loop whose last three axes intersect.
+
+    None if the position equations do not determine joints 1 to 3.
+    """
     ring = scene.ring
     first, last = _height(scene.after(3).pose)[0], _height(scene.after(4).pose.inverse())[0]
     point = (scene.after(2).pose @ Pose.translation(vector([0, 0, first]))).p
@@ -653,7 +713,7 @@ def _length(problem: Problem) -> SX:
 
 
 def _arrangements(problem: Problem) -> list[PieperLoop]:
-    """Return the loop in all arrangements whose last three axes intersect."""
+    """Return the loop with every start and direction for which its last three axes intersect."""
     length = _length(problem)
     found = list[PieperLoop]()
     for k in _concurrent(problem, length):
@@ -664,7 +724,7 @@ def _arrangements(problem: Problem) -> list[PieperLoop]:
 
 
 def _pose_comes_first(scene: PieperLoop) -> bool:
-    """Whether the transform with the most symbols, which contains the pose, follows joint 1."""
+    """Whether the transform that contains the pose (the most symbols) follows joint 1."""
     counts = [len(casadi.symvar(gap.pose.matrix)) for gap in scene.ring.gaps]
     return counts[1] == max(counts)
 
@@ -680,7 +740,10 @@ def _regular(problem: Problem, steps: list[SequenceStep]) -> bool:
 
 
 def _concurrent(problem: Problem, length: SX) -> list[int]:
-    """Return the indices k for which the axes of joints k, k + 1 and k + 2 meet in one point."""
+    """Return the indices k for which the axes of joints k, k + 1 and k + 2 meet in one point.
+
+    `length` is the typical length of the loop [m].
+    """
     gaps, joints = problem.ring.gaps, problem.ring.joints
     after = [gaps[(k + 1) % _JOINTS].pose for k in range(_JOINTS)]
     ahead, behind = [_height(way) for way in after], [_height(way.inverse()) for way in after]
@@ -698,10 +761,10 @@ def _concurrent(problem: Problem, length: SX) -> list[int]:
 
 
 def _height(way: Pose) -> tuple[SX, SX, SX, SX]:
-    """Return the common normal of the z axis and another axis, as coordinates.
+    """Return the common normal of the z axis of a frame and the z axis of another, as coordinates.
 
     Args:
-        way: pose of a frame, whose z axis is the other axis.
+        way: pose of the other frame.
 
     Returns:
         Coordinate of the normal on the z axis, coordinate on the other axis, a measure of the
@@ -714,7 +777,7 @@ def _height(way: Pose) -> tuple[SX, SX, SX, SX]:
 
 
 def _refusal(names: list[str]) -> str:
-    """Return the error message for loops to which Pieper's method does not apply."""
+    """Return error message for a loop of these joints to which Pieper's method does not apply."""
     return (
         f"no three neighbouring axes of {names[0]} .. {names[-1]} meet in a point and no three"
         " joints are prismatic, so that Pieper's method does not apply; use the general method"

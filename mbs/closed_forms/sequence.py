@@ -50,7 +50,10 @@ class Problem:
         return len(self.ring.joints)
 
     def at_samples(self, values: SX) -> list[Matrix]:
-        """Return an expression of x and given at every sample, with further angles zero."""
+        """Return the value of an expression of x and given at every sample.
+
+        Further angles, which are not joint positions, are zero.
+        """
         function = Function("values", [self.x, self.given], [values])
         rest = np.zeros(self.x.numel() - self.size)
         return [
@@ -58,7 +61,7 @@ class Problem:
         ]
 
     def always_zero(self, values: SX) -> bool:
-        """Whether an expression of x and given is zero at all closed configurations (samples)."""
+        """Whether all elements of an expression of x and given are zero at all samples."""
         return all(bool(np.all(np.abs(sample) < ZERO)) for sample in self.at_samples(values))
 
 
@@ -132,7 +135,7 @@ def step(
 
 
 def _name(problem: Problem, index: int) -> str:
-    """Return the name of the joint with this index in x, or of its symbol."""
+    """Return the name of the joint with this index in x, else the name of its symbol."""
     names = {joint.index: joint.name for joint in problem.ring.joints}
     return names.get(index, str(problem.x[index]))
 
@@ -183,7 +186,7 @@ class StepSequence:
         return int(2 ** len(self.signs))
 
     def choice(self, branch: int) -> tuple[int, ...]:
-        """Return the signs, +1 or -1, of a branch."""
+        """Return the signs, +1 or -1, of branch b as a tuple in the order of `signs`."""
         count = len(self.signs)
         return tuple(-1 if branch >> (count - 1 - k) & 1 else 1 for k in range(count))
 
@@ -193,7 +196,7 @@ class StepSequence:
         return " ".join(f"{name}:{'+' if sign > 0 else '-'}" for name, sign in signs)
 
     def leaf(self, given: SX, s: SX) -> Leaf:
-        """Return the configuration for signs s (number of signs, 1), given as expressions."""
+        """Return the configuration for known quantities `given` and a vector s of all signs."""
         leaf, first = self._start(), 0
         for step in self.steps:
             chosen = s[first : first + len(step.signs)]
@@ -201,7 +204,10 @@ class StepSequence:
         return self._crop(leaf)
 
     def leaves(self, given: SX) -> list[Leaf]:
-        """Return the configurations of all branches in order, with common steps computed once."""
+        """Return the configurations of all branches in order, with common steps computed once.
+
+        `given` (m, 1) are the known quantities.
+        """
         leaves = [self._start()]
         for step in self.steps:
             choices = list(itertools.product((1, -1), repeat=len(step.signs)))
@@ -213,16 +219,16 @@ class StepSequence:
         return [self._crop(leaf) for leaf in leaves]
 
     def _start(self) -> Leaf:
-        """Return the empty configuration from which the steps start."""
+        """Return the empty configuration before the first step."""
         return Leaf(SX(2 * self.size, 1), SX(0, 1), SX(0, 1), {})
 
     def _crop(self, leaf: Leaf) -> Leaf:
-        """Return a configuration without the indices reserved for sums of joints."""
+        """Return a configuration without the positions that are sums of joints."""
         return Leaf(leaf.x[: self.size], leaf.real, leaf.regular, leaf.coefficients)
 
 
 def _take(leaf: Leaf, step: SequenceStep, given: SX, s: SX) -> Leaf:
-    """Return the configuration after a further step."""
+    """Return the configuration after a further step with signs s."""
     values, real, regular, coefficients = step.function(leaf.x, given, s)
     x = SX(leaf.x)
     x[list(step.indices)] = values
@@ -276,12 +282,24 @@ def cosine_root(X: SX, Y: SX, Z: SX, sign: SX, scale: SX | float = 1.0) -> Root:
 
 
 def angle_of(s: SX, c: SX, scale: SX | float = 1.0) -> Root:
-    """Return the angle whose sine and cosine are s and c, up to one positive factor."""
+    """Return the angle whose sine and cosine are s and c times one positive factor.
+
+    Args:
+        s: sine times the factor.
+        c: cosine times the factor.
+        scale: typical size of s and c.
+    """
     return Root(SX(casadi.atan2(s, c)), SX(1), SX((s * s + c * c) / (scale * scale)))
 
 
 def square_root(square: SX, sign: SX, scale: SX | float = 1.0) -> Root:
-    """Return the root of r^2 = square with a given sign; scale is the typical size of r."""
+    """Return the root of r^2 = square with a given sign.
+
+    Args:
+        square: square of the root.
+        sign: +1 or -1.
+        scale: typical size of r.
+    """
     value = sign * casadi.sqrt(casadi.fmax(square, NONZERO))
     return Root(SX(value), SX(square / (scale * scale)), SX(1))
 
@@ -434,7 +452,7 @@ def _line(A: SX, curve: _Curve, sign: SX) -> tuple[SX, SX, SX]:
 
 
 def _degenerate(A: SX, curve: _Curve) -> SX:
-    """Return A plus the multiple of the curve that makes a pair of lines, real if possible."""
+    """Return A (3, 3) plus the multiple of the curve that gives two lines, real if possible."""
     adjugate = _adjugate(A)
     linear = casadi.sum1(casadi.sum2(adjugate * SX(curve.C))) / curve.determinant
     constant = casadi.dot(A[:, 0], adjugate[:, 0]) / curve.determinant
@@ -463,14 +481,14 @@ def _outer_roots(c: SX, d: SX) -> list[SX]:
 
 
 def _adjugate(M: SX) -> SX:
-    """Return the adjugate (3, 3) of a symmetric matrix."""
+    """Return the adjugate (3, 3) of a symmetric matrix M (3, 3)."""
     a, b, c, d, e, f = M[0, 0], M[0, 1], M[0, 2], M[1, 1], M[1, 2], M[2, 2]
     off = (c * e - b * f, b * e - c * d, b * c - a * e)
     return _symmetric((d * f - e * e, off[0], off[1]), (a * f - c * c, off[2]), a * d - b * b)
 
 
 def _largest(sizes: list[SX], values: list[SX]) -> SX:
-    """Return the value that belongs to the largest of three sizes."""
+    """Return the element of `values` that belongs to the largest of three `sizes`."""
     late = casadi.if_else(sizes[2] > sizes[1], values[2], values[1])
     first = casadi.logic_and(sizes[0] >= sizes[1], sizes[0] >= sizes[2])
     return SX(casadi.if_else(first, values[0], late))
@@ -482,14 +500,14 @@ def _minus_sign(value: SX) -> SX:
 
 
 def _newton(value: SX, slope: SX, most: SX | float) -> SX:
-    """Return a Newton step that is not larger than half of `most`."""
+    """Return Newton's step for a value and its slope, bounded by half of `most`."""
     # for slopes below 1e-15, which are rounding, the step tends to zero instead of infinity
     step = -value * slope / (slope * slope + 1e-30)
     return SX(step / (1 + (step / most) ** 2))
 
 
 def _trigonometric(b: SX, t: SX) -> tuple[SX, SX]:
-    """Return the trigonometric polynomial and its slope."""
+    """Return the polynomial of `trigonometric_quartic` with coefficients b at t, and its slope."""
     c, s = casadi.cos(t), casadi.sin(t)
     c2, s2 = c * c - s * s, 2 * s * c
     value = b[0] * c2 + b[1] * s2 + b[2] * c + b[3] * s + b[4]
@@ -497,7 +515,7 @@ def _trigonometric(b: SX, t: SX) -> tuple[SX, SX]:
 
 
 def _quartic(b: SX, r: SX) -> tuple[SX, SX]:
-    """Return the polynomial and its slope, both divided by (1 + r^2)^2."""
+    """Return the quartic with coefficients b at r and its slope, divided by (1 + r^2)^2."""
     value = (((b[0] * r + b[1]) * r + b[2]) * r + b[3]) * r + b[4]
     slope = ((4 * b[0] * r + 3 * b[1]) * r + 2 * b[2]) * r + b[3]
     size = (1 + r * r) ** 2
@@ -505,7 +523,7 @@ def _quartic(b: SX, r: SX) -> tuple[SX, SX]:
 
 
 def _quadratic(line: SX, root: SX) -> SX:
-    """Return (-b + root) / (2 a) for a r^2 + b r + c, without cancellation and bounded."""
+    """Return (-b + root) / (2 a) for `line` = (a, b, c), without cancellation and bounded."""
     a, b, c = line[0], line[1], line[2]
     up, down = root - b, -b - root
     steady = b * root <= 0

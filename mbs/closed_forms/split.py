@@ -26,7 +26,7 @@ _AXES = Pose.rotation(SX(DM([[1, 0, 0], [0, 0, -1], [0, 1, 0]])))
 
 
 def split(ring: Ring, q: SX, p: SX) -> LoopBranches | str:
-    """Return the branches of the revolute and prismatic joints of a loop, or text on the failure.
+    """Return the branches of the revolute and prismatic joints of a loop, by Paul's method.
 
     A spherical joint is replaced by three revolute joints, whose positions are not returned. The
     label of a branch has the signs of all steps with several roots, each named after its joint.
@@ -35,6 +35,9 @@ def split(ring: Ring, q: SX, p: SX) -> LoopBranches | str:
         ring: loop chain.
         q: symbols of positions, cut joints included.
         p: symbols of parameters.
+
+    Returns:
+        Branches, or text that describes why the method fails.
     """
     simple = _without_spherical(ring)
     if len(simple.joints) > _MOST:
@@ -66,7 +69,10 @@ def _without_spherical(ring: Ring) -> Ring:
 
 
 def _problem(ring: Ring, q: SX, p: SX) -> Problem | str:
-    """Return the loop with joint indices from zero, or why it does not determine its joints."""
+    """Return the loop as a problem with joint indices from zero.
+
+    Text on the reason instead, if the known quantities do not determine its joints.
+    """
     gaps = SX(casadi.vertcat(*(casadi.vec(gap.pose.matrix) for gap in ring.gaps)))
     symbols = {symbol.name() for symbol in casadi.symvar(gaps)}
     every = [*casadi.vertsplit(q), *casadi.vertsplit(p)]
@@ -84,7 +90,7 @@ def _problem(ring: Ring, q: SX, p: SX) -> Problem | str:
 
 
 def _root(ring: Ring, problem: Problem, sequence: StepSequence) -> LoopBranches:
-    """Return the branches of a loop from the steps of a solved sequence."""
+    """Return the branches of a loop from the sequence of steps that solves `problem`."""
     indices = {k: joint.index for k, joint in enumerate(ring.joints) if joint.index is not None}
     needed = _up_to(sequence, set(indices))
     branches = dict[str, dict[int, SX]]()
@@ -95,7 +101,7 @@ def _root(ring: Ring, problem: Problem, sequence: StepSequence) -> LoopBranches:
 
 
 def _up_to(sequence: StepSequence, target: set[int]) -> StepSequence:
-    """Return the first steps that are needed to solve the joints of the indices `target`."""
+    """Return the first steps of a sequence that solve the joints with indices `target`."""
     steps = list[SequenceStep]()
     for step in sequence.steps:
         if target:
@@ -105,7 +111,7 @@ def _up_to(sequence: StepSequence, target: set[int]) -> StepSequence:
 
 
 def _where_real(leaf: Leaf) -> SX:
-    """Return the positions, or NaN if a radicand is negative."""
+    """Return the positions (n, 1) of a branch; NaN if a radicand is negative."""
     real = leaf.real
     if real.numel() == 0:
         return leaf.x

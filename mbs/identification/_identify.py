@@ -62,7 +62,7 @@ def report(estimate: Estimate, *tests: tuple[str, Residuals]) -> str:
     """Return a text report of parameters, standard deviations, residuals and excitation.
 
     Args:
-        estimate: estimate of any method.
+        estimate: parameter values, covariance and residuals of any estimation method.
         *tests: pairs (title, residuals) of further tests, such as ("last quarter", held_out(...)).
 
     Returns:
@@ -98,9 +98,13 @@ def identification_report(
 
     Args:
         estimate: estimate of base parameters.
-        essential: reduced estimate with the essential parameters.
-        bodies: estimate of the full parameter set, or the reason why there is none.
+        essential: result of the reduction of `estimate` to its essential parameters.
+        bodies: physically consistent estimate of the full parameter set, or the reason why there
+            is none.
         *tests: pairs (title, residuals) of further tests of the base parameters.
+
+    Returns:
+        Lines of text.
     """
     few = essential.estimate
     lines = [
@@ -113,7 +117,7 @@ def identification_report(
 
 
 def _parameters(estimate: Estimate) -> list[str]:
-    """Return the lines of the table of parameters: value, deviation and relative deviation."""
+    """Return the lines of the table of parameters: name, value and standard deviation."""
     lines = [f"{'parameter':<12}{'value':>12}{'deviation':>12}{'%':>9}  unit"]
     rows = zip(
         estimate.columns, estimate.values, estimate.deviations, estimate.percent, strict=True
@@ -128,7 +132,10 @@ def _parameters(estimate: Estimate) -> list[str]:
 
 
 def _residuals(title: str, residuals: Residuals) -> list[str]:
-    """Return the lines of the table of residuals of the efforts."""
+    """Return the lines of a table of residuals: percentage, rms and independent rows per effort.
+
+    `title` is printed in its first line.
+    """
     lines = [
         f"{title}: {residuals.total_percent:.2f} % of all efforts",
         f"{'effort':<12}{'error':>10}{'rms':>12}  {'unit':<6}{'independent rows':>18}",
@@ -148,7 +155,7 @@ def _residuals(title: str, residuals: Residuals) -> list[str]:
 
 
 def _fit(residuals: Residuals) -> list[str]:
-    """Return a remark if the residuals are too large to be noise."""
+    """Return a remark as a list of one line if the residuals are too large to be noise, else []."""
     if not residuals.total_percent > _UNFIT:
         return []
     return [
@@ -158,7 +165,7 @@ def _fit(residuals: Residuals) -> list[str]:
 
 
 def _drop(observations: Observations) -> list[str]:
-    """Return a remark on instants near singular configurations that are left out."""
+    """Return a remark on the instants near singular configurations that were left out, or []."""
     if not observations.dropped:
         return []
     rows = len(observations.time)
@@ -169,7 +176,10 @@ def _drop(observations: Observations) -> list[str]:
 
 
 def _excitation(estimate: Estimate) -> list[str]:
-    """Return a remark on the excitation; none for a full set, which is never fully identifiable."""
+    """Return a remark on the condition number, or on parameters that are not identifiable.
+
+    [] for a full parameter set, which is never fully identifiable.
+    """
     if _is_full(estimate):
         return []
     quality = excitation_quality(estimate.observations)
@@ -182,7 +192,10 @@ def _excitation(estimate: Estimate) -> list[str]:
 
 
 def _consistency(estimate: Estimate) -> list[str]:
-    """Return a remark on physical consistency, if all parameters of every link are estimated."""
+    """Return a remark whether each link has a positive definite pseudo-inertia.
+
+    [] unless all ten inertial parameters of every link are estimated.
+    """
     if not _is_full(estimate):
         return []
     links = {c.link for c in estimate.columns if c.kind in INERTIAL}
@@ -200,7 +213,7 @@ def _is_full(estimate: Estimate) -> bool:
 
 
 def _signs(estimate: Estimate) -> list[str]:
-    """Return a remark on friction and rotor inertias that are significantly negative."""
+    """Return a remark on friction or rotor inertias that are significantly negative, or []."""
     rows = zip(estimate.columns, estimate.values, estimate.deviations, strict=True)
     kinds = ("Ia", "Iam", "Jm", "Fv", "Fvm", "Fs", "Fsm")
     bad = [c.name for c, x, s in rows if c.kind in kinds and x < -_SURE * s]
@@ -249,11 +262,20 @@ class Identification:
         )
 
     def essential(self, largest_percent: float = LARGEST_PERCENT) -> Essential:
-        """Return the essential base parameters; see `essential`."""
+        """Return the estimate reduced to the essential base parameters.
+
+        Args:
+            largest_percent: relative standard deviation [%] at which the elimination ends; see
+                `mbs.identification.essential`.
+        """
         return essential(self.estimate, largest_percent)
 
     def cross_validated(self, count: int = 4) -> Residuals:
-        """Return the residuals of each part of the record, with parameters from the other parts."""
+        """Return the residuals of each part of the record, with parameters from the other parts.
+
+        Args:
+            count: number of parts, at least two.
+        """
         return cross_validated(self.estimator, self.estimate.observations, count)
 
     def identified_system(self) -> System:
@@ -275,7 +297,7 @@ class Identification:
         return bodies_table(self.system, bodies.columns, bodies.values)
 
     def text(self) -> str:
-        """Return both parameter sets with standard deviations and residuals as text."""
+        """Return a printable report of base parameters, essential parameters and bodies."""
         title = (
             f"{self.system.name}: {self.base.count} base parameters of {len(self.base.columns)},"
             f" bandwidth {self.bandwidth:g} Hz"
@@ -366,7 +388,10 @@ def identify(
 
 
 def _found_bodies(search: Callable[[], Estimate], method: str) -> tuple[Estimate | None, str]:
-    """Return the bodies and "", or None and the error text if the method does not require them."""
+    """Call `search`; return its estimate and "", or None and the message if it does not converge.
+
+    The error is raised if the method is "consistent", which requires the bodies.
+    """
     try:
         return search(), ""
     except SolverError as error:
@@ -376,14 +401,17 @@ def _found_bodies(search: Callable[[], Estimate], method: str) -> tuple[Estimate
 
 
 def _between(reached: Callable[[float], None], first: float, last: float, part: float) -> None:
-    """Report a progress between `first` and `last`, for a fraction `part` from 0 to 1."""
+    """Call `reached` with the progress between `first` and `last` at fraction `part` (0 to 1)."""
     reached(first + part * (last - first))
 
 
 def _records(
     system: System, record: Record | Sequence[Record], bandwidth: float
 ) -> tuple[Record, ...]:
-    """Return the records as a tuple, after type checks."""
+    """Return one record or a list of records as a tuple.
+
+    Raises ModelError for another type, an empty list, or a bandwidth that is not a number.
+    """
     given = tuple(record) if isinstance(record, list | tuple) else (record,)
     for one in given:
         if not isinstance(one, Record):
@@ -401,12 +429,12 @@ def _records(
 
 
 def _options(rotors: bool, offsets: bool, couplings: Sequence[Joints]) -> dict[str, Any]:
-    """Return the options of the regressor as a dict."""
+    """Return the options of `columns_of` as a dict of keyword arguments."""
     return {"rotors": rotors, "offsets": offsets, "couplings": couplings}
 
 
 def _check(system: System, method: str, equations: str, smoothing: object) -> None:
-    """Raise ModelError if an option of the identification is invalid."""
+    """Raise ModelError if the method, the equations or the smoothing function is unknown."""
     require_system(system)
     if not callable(smoothing):
         raise ModelError(

@@ -17,12 +17,12 @@ def entries() -> tuple[Entry, ...]:
 
 
 def _grouping(system: System, method: str, moving_base: bool) -> Function:
-    """Return the function ``base_parameters(K) -> K_base`` of a system; see `base_parameters`."""
+    """Return the Function ``base_parameters(K) -> K_base``; see `base_parameters`."""
     return base_parameters(system, method, moving_base=moving_base).function
 
 
 def _set(system: System, method: str, moving_base: bool) -> str:
-    """Return the base parameters as text."""
+    """Return the base parameters as text for the menu entry; see `base_parameters`."""
     return base_parameters(system, method, moving_base=moving_base).text() + "\n"
 
 

@@ -51,9 +51,13 @@ _POWER = 8
 
 
 def log_det(G: Array) -> tuple[float, Array]:
-    """Return -log det(G)/n for G = W'W, and its gradient.
+    """Return -log det(G)/n and its gradient (n, n), as a criterion of excitation.
 
     It is the mean logarithm of the parameter variances. A change of units adds a constant only.
+
+    Args:
+        G: (n, n) Gram matrix W'W of the observation matrix. If it is not positive definite, value
+            and gradient are NaN.
     """
     size = np.sqrt(np.maximum(np.diag(G), NONZERO))
     values, vectors = np.linalg.eigh(G / np.outer(size, size))
@@ -64,10 +68,14 @@ def log_det(G: Array) -> tuple[float, Array]:
 
 
 def condition(G: Array) -> tuple[float, Array]:
-    """Return a smooth bound of the logarithm of the condition number of W, and its gradient in G.
+    """Return a smooth upper bound of log(cond(W)) and its gradient (n, n) in G.
 
-    The largest eigenvalue of G = W'W is replaced by a high-order norm of all eigenvalues, and the
-    smallest by the same norm of their inverses, which gives an upper bound.
+    The largest eigenvalue of G is replaced by a high-order norm of all eigenvalues, and the
+    smallest by the same norm of their inverses.
+
+    Args:
+        G: (n, n) Gram matrix W'W of the observation matrix. If it is not positive definite, value
+            and gradient are NaN.
     """
     values, vectors = np.linalg.eigh(G)
     if values[0] <= 0:
@@ -79,7 +87,14 @@ def condition(G: Array) -> tuple[float, Array]:
 
 
 def scaled_condition(G: Array) -> tuple[float, Array]:
-    """Return `condition` for columns of W of unit length, which is independent of units."""
+    """Return `condition` for columns of W scaled to unit length, which is independent of units.
+
+    Args:
+        G: (n, n) Gram matrix W'W of the observation matrix.
+
+    Returns:
+        Value, and its gradient (n, n) in G.
+    """
     size = np.sqrt(np.maximum(np.diag(G), NONZERO))
     S = G / np.outer(size, size)
     value, slope = condition(S)
@@ -96,7 +111,7 @@ CRITERIA: Mapping[str, Criterion] = {
 
 
 class CriterionFunction(casadi.Callback):
-    """CasADi callback ``criterion(G) -> f`` with the exact gradient of the criterion.
+    """CasADi callback ``criterion(G) -> f`` of a Gram matrix G (n, n), with its exact gradient.
 
     Keep a reference to it for as long as a Function that contains it is used.
     """
@@ -125,7 +140,7 @@ class CriterionFunction(casadi.Callback):
         return Sparsity.dense(1, 1)
 
     def eval(self, arguments: Sequence[DM]) -> list[DM]:
-        """Evaluate the criterion."""
+        """Return the value of the criterion for the Gram matrix in `arguments`."""
         return [DM(self._criterion(np.array(arguments[0]))[0])]
 
     def has_jacobian(self) -> bool:
@@ -133,13 +148,13 @@ class CriterionFunction(casadi.Callback):
         return True
 
     def get_jacobian(self, name: str, *_: Any) -> casadi.Function:
-        """Return a callback for the gradient as one row (1, n^2)."""
+        """Return a callback of (G, f) for the gradient as one row (1, n^2), with this name."""
         self._slopes.append(_Slope(self._criterion, self._n, name))
         return self._slopes[-1]
 
 
 class _Slope(casadi.Callback):
-    """``(G, f) -> df/dG`` (1, n^2)."""
+    """CasADi callback ``(G, f) -> df/dG`` (1, n^2): gradient of a criterion of G (n, n)."""
 
     def __init__(self, criterion: Criterion, n: int, name: str) -> None:
         casadi.Callback.__init__(self)
@@ -174,9 +189,10 @@ _OUTPUTS = ("x", "f", "g", "lam_x", "lam_g", "lam_p")
 
 
 class SolverFollower(casadi.Callback):
-    """Iteration callback of the solver that reports progress.
+    """Iteration callback of a CasADi nlpsol solver that reports the progress of the optimisation.
 
-    Keep a reference to it for as long as the solver is used.
+    Keep a reference to it for as long as the solver is used. `watch` is called with the completed
+    fraction of `most` iterations.
     """
 
     def __init__(
@@ -281,13 +297,16 @@ class Programme:
         return int(self.instant.size1_in(0))
 
     def series(self, x: Array) -> FourierSeries:
-        """Return the Fourier series of the variables x."""
+        """Return the Fourier series of the programme variables x (m (2 harmonics - 1),)."""
         m, H = self.joints, self.harmonics
         Y = x[m:].reshape(m, 2 * H - 2) @ resting_coefficients(self.period, H).T
         return FourierSeries(self.period, x[:m], Y[:, :H], Y[:, H:])
 
     def start(self, rng: np.random.Generator) -> Array:
-        """Return the variables of the best random motion within the ranges of the joints.
+        """Return the variables of the best of 30 random motions within the ranges of the joints.
+
+        Args:
+            rng: random number generator.
 
         Raises:
             SolverError: no random motion gives observations of full column rank.
@@ -307,7 +326,10 @@ class Programme:
         return min(found, key=lambda pair: pair[0])[1]
 
     def _random(self, rates: Array, filled: float, rng: np.random.Generator) -> Array:
-        """Return the variables of a random motion that uses the fraction `filled` of the ranges."""
+        """Return variables of a random motion that uses the fraction `filled` of the joint ranges.
+
+        `rates` is the matrix of `_rates`.
+        """
         m = self.joints
         lower, upper = self._ranges(1.0)
         middle = (lower[:m] + upper[:m]) / 2
@@ -324,7 +346,8 @@ class Programme:
 
         Args:
             x: variables of the initial guess.
-            tightened: (r,) reduction of the ranges of model quantities at each end.
+            tightened: (r,) reduction of the ranges of efforts, passive positions and planes at each
+                end, in the units of the limits.
             rounds: maximum number of iterations.
             watch: progress callback; its argument is the completed fraction of the iterations.
 
@@ -355,7 +378,7 @@ class Programme:
         )
 
     def _graph(self) -> tuple[MX, MX, MX]:
-        """Return the variables, W' (k, m samples) and bounded model quantities (r, samples)."""
+        """Return variables, W' (k, m samples) and limited model quantities (r, samples) as MX."""
         variables = MX.sym("x", self.joints * (2 * self.harmonics - 1))
         moved = casadi.reshape(_product(self._rates(), variables), self.samples, 3 * self.joints).T
         q, v, a = casadi.vertsplit(moved, self.joints)
@@ -382,9 +405,9 @@ class Programme:
         return np.vstack(blocks)
 
     def _ranges(self, part: float) -> tuple[Array, Array]:
-        """Return the lower and upper ends (3 m,) of the ranges of q, v and a.
+        """Return the lower and upper limits (3 m,) of q, v and a; infinite without a limit.
 
-        The ranges are scaled about their middles by the factor `part`.
+        Finite ranges are scaled about their middles by the factor `part`.
         """
         ends = np.array([(limit.lower, limit.upper) for limit in self.limits.of_rates])
         limited = np.isfinite(ends).all(axis=1)
@@ -392,7 +415,7 @@ class Programme:
         return half + part * (ends[:, 0] - half), half + part * (ends[:, 1] - half)
 
     def _bounded_rates(self) -> tuple[Array, Array, Array]:
-        """Return the limited rows of `_rates` and the ends of their ranges.
+        """Return the rows of `_rates` that have limits, and the lower and upper limit of each row.
 
         The ranges are reduced so that the limits also hold between samples.
         """
@@ -402,7 +425,11 @@ class Programme:
         return self._rates()[limited], first, last
 
     def _bounded_models(self, tightened: Array) -> tuple[list[int], Array]:
-        """Return the indices of the limited model quantities and their ranges (rows, 2)."""
+        """Return indices and ranges (rows, 2) of the limited quantities of models.
+
+        These are efforts, passive positions and planes. Both ends of each range are reduced by
+        `tightened` (r,).
+        """
         every: tuple[MotionLimit, ...] = self.limits.of_models
         rows = [k for k, limit in enumerate(every) if limit.is_finite]
         ends = [(every[k].lower + tightened[k], every[k].upper - tightened[k]) for k in rows]
@@ -410,7 +437,10 @@ class Programme:
 
 
 def _product(A: Array, x: MX) -> MX:
-    """Return A x as a dense vector, including rows of A that are zero (velocities at rest)."""
+    """Return A x as a dense column; elements of A that are rounding errors count as zero.
+
+    Rows of A that are entirely zero (velocities at rest) remain in the result.
+    """
     sizes = np.abs(A)
     structure = np.where(sizes > _ROUNDING * sizes.max(axis=0, initial=0.0), A, 0.0)
     product: MX = casadi.densify(casadi.sparsify(DM(structure)) @ x)
@@ -598,7 +628,11 @@ def _within(
     rounds: int,
     watch: Watch,
 ) -> Trajectory:
-    """Return the optimal motion near x, with limits of efforts and planes also between samples."""
+    """Return the optimal motion near the variables x that keeps all limits also between samples.
+
+    Limits that `measured` (variables -> Trajectory) finds exceeded are tightened and the
+    optimisation is repeated. Raises SolverError if this does not succeed.
+    """
     narrowed = np.zeros(len(programme.limits.of_models))
     fixed = len(programme.limits.of_rates)
     for _ in range(_TRIES):
@@ -620,7 +654,10 @@ def _within(
 def _measure(
     system: System, columns: tuple[Column, ...], programme: Programme, x: Array
 ) -> Trajectory:
-    """Return the motion with condition numbers and margins, computed without smoothing."""
+    """Return the motion of the variables x with its condition numbers and margins.
+
+    They are evaluated at instants eight times as dense as the samples, without smoothed friction.
+    """
     motion, limits = programme.series(x), programme.limits
     exact = instant(system, columns, limits)
     n = _FINE * programme.samples
@@ -662,7 +699,10 @@ def _form(series: FourierSettings | None) -> FourierSettings:
 def _columns(
     system: System, columns: BaseParameters | Sequence[Column] | None
 ) -> tuple[Column, ...]:
-    """Return the parameters to identify; the base parameters for None."""
+    """Return the parameters to identify; the base parameters for None.
+
+    Raises ModelError for an empty selection or an element that is no Column.
+    """
     if columns is None:
         return tuple(base_parameters(system).kept)
     chosen = tuple(columns if isinstance(columns, Sequence) else columns.kept)
@@ -673,7 +713,10 @@ def _columns(
 
 
 def _smooth(system: System, limits: MotionLimits, form: FourierSettings) -> System:
-    """Return a copy of the system with the sign of Coulomb friction smoothed."""
+    """Return a copy of the system in which Coulomb friction changes its sign continuously.
+
+    The width of the transition is a fraction of the largest velocity of each joint.
+    """
     widths = {}
     rows = zip(system.active, limits.position, limits.velocity, strict=True)
     for k, position, velocity in rows:
@@ -703,6 +746,6 @@ def _check(system: System, objective: str, starts: int, rounds: int) -> None:
 
 
 def _condition(W: Array) -> float:
-    """Return the condition number of W."""
+    """Return the condition number of the matrix W: its largest over its smallest singular value."""
     values = np.linalg.svd(W, compute_uv=False)
     return float(values[0] / values[-1])

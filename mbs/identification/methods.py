@@ -54,16 +54,20 @@ class Setting:
     prior: Prior
 
     def bodies_of(self, part: Observations) -> Estimate:
-        """Return the physically consistent estimate of all or some equations of the record."""
+        """Return the physically consistent estimate of all or some equations of the record.
+
+        `part` are equations at some of the instants of `full`.
+        """
         if self.bodies is not None and len(part.time) == len(self.full.time):
             return self.bodies
         return consistent_weighted(self.full.at(part.time), self.prior)
 
     def moving(self, part: Observations) -> Array:
-        """Return values (k,) of the full set for a simulation of the motion.
+        """Return values (k,) of the full parameter set with which the robot is simulated.
 
-        They are the values of `bodies_of`. If these do not converge, they are base parameters by
-        weighted least squares at the kept columns, which give the same efforts, and zeros.
+        They are the values of `bodies_of(part)`. If that search does not converge, they are the
+        base parameters by weighted least squares at the kept columns, which give the same efforts,
+        and zeros.
         """
         try:
             return self.bodies_of(part).values
@@ -74,7 +78,7 @@ class Setting:
 
 
 def _by_instruments(setting: Setting) -> Estimator:
-    """Return the instrumental-variable method, with instruments from a simulated motion."""
+    """Return the instrumental-variable estimator, with instruments from a simulated motion."""
 
     def estimator(observations: Observations) -> Estimate:
         values = setting.moving(observations)
@@ -88,7 +92,7 @@ def _by_instruments(setting: Setting) -> Estimator:
 
 
 def _by_bodies(setting: Setting) -> Estimator:
-    """Return the method that computes base parameters from physically consistent bodies."""
+    """Return the estimator that computes base parameters from physically consistent bodies."""
 
     def estimator(observations: Observations) -> Estimate:
         bodies = setting.bodies_of(observations)
@@ -167,6 +171,10 @@ def essential(
 
     Raises:
         ModelError: the estimate has no covariance, or a bound is out of range.
+
+    Returns:
+        Estimate in the remaining parameters, names of the eliminated parameters, and the reason why
+        the elimination ended.
     """
     if not (largest_percent > 0 and 0 < significance < 1):
         raise ModelError(
@@ -206,7 +214,7 @@ def _freedom(estimate: Estimate) -> float:
 
 
 def _without(estimate: Estimate, dropped: Sequence[int]) -> tuple[list[int], Array, Array]:
-    """Return indices, values and covariance of the kept parameters if `dropped` are zero.
+    """Return indices, values and covariance of the other parameters if those in `dropped` are zero.
 
     Source: Draper & Smith 1998 (restricted least squares, from the covariance).
     """
@@ -220,7 +228,7 @@ def _without(estimate: Estimate, dropped: Sequence[int]) -> tuple[list[int], Arr
 
 
 def _ratio(estimate: Estimate, dropped: Sequence[int]) -> float:
-    """Return the F statistic of the hypothesis that the `dropped` parameters are zero."""
+    """Return the F statistic of the hypothesis that the parameters `dropped` (indices) are zero."""
     size = estimate.deviations[dropped]
     values = estimate.values[dropped] / size
     correlation = estimate.covariance[np.ix_(dropped, dropped)] / np.outer(size, size)
@@ -230,7 +238,7 @@ def _ratio(estimate: Estimate, dropped: Sequence[int]) -> float:
 def _estimate(
     estimate: Estimate, kept: Sequence[int], values: Array, covariance: Array
 ) -> Estimate:
-    """Return the estimate of the kept ("essential") parameters only."""
+    """Return the estimate of the parameters with indices `kept` and these values and covariance."""
     names = [estimate.names[k] for k in kept]
     return Estimate(
         f"{estimate.method}, essential",

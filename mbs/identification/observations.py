@@ -44,7 +44,11 @@ interval in spite of rounding. Sampling periods are a thousand times larger."""
 
 
 def led_rows(system: System, q: Array) -> Chosen:
-    """Return a mask (n,) of the configurations q (n, nq) that are not close to singular ones.
+    """Return a mask (n,) of the configurations that are not close to singular ones.
+
+    Args:
+        system: closed system.
+        q: (n, nq) positions in the order of time [rad or m].
 
     Raises:
         ModelError: more than half of the configurations are close to singular ones.
@@ -62,7 +66,12 @@ def led_rows(system: System, q: Array) -> Chosen:
 
 
 def on_lines(values: Array, good: Chosen) -> Array:
-    """Replace the rows of values (n, ...) that are not good by linear interpolation."""
+    """Return values with the rows that are not good replaced by linear interpolation.
+
+    Args:
+        values: (n, ...) values in the order of time.
+        good: (n,) mask of the rows that are kept.
+    """
     if good.all():
         return values
     at, known = np.arange(len(good)), np.flatnonzero(good)
@@ -73,7 +82,14 @@ def on_lines(values: Array, good: Chosen) -> Array:
 
 
 def without(time: Array, bad: Array, ahead: float, back: float) -> Chosen:
-    """Return a mask (n,) of the instants without a bad instant in [time - back, time + ahead]."""
+    """Return a mask (n,) of the instants t that have no bad instant in [t - back, t + ahead].
+
+    Args:
+        time: (n,) instants [s].
+        bad: sorted bad instants [s].
+        ahead: length of the window after an instant [s].
+        back: length of the window before an instant [s].
+    """
     first = np.searchsorted(bad, time - back * (1 + _ROUNDING), side="left")
     last = np.searchsorted(bad, time + ahead * (1 + _ROUNDING), side="right")
     return np.asarray(first == last, dtype=bool)
@@ -86,7 +102,12 @@ _BATCH = 500
 
 
 def known_of(regressor: Any, samples: Samples) -> Array:
-    """Return the efforts (n, m) of springs and force elements without a column [N m or N]."""
+    """Return the efforts (n, m) of springs and force elements that have no column [N m or N].
+
+    Args:
+        regressor: Function D(q, v, a) with `.columns` and `.system`.
+        samples: motion at which the efforts are evaluated.
+    """
     system: System = regressor.system
     if not _has_elements(system):
         return np.zeros(samples.tau.shape)
@@ -130,7 +151,12 @@ def motion_of(model: Any, samples: Samples) -> tuple[Array, Array, Array]:
 def led_samples(model: Any, samples: Samples) -> npt.NDArray[np.bool_]:
     """Return a mask (n,) of the samples that are not close to singular configurations.
 
-    There, the independent joints of a closed system determine the motion of the other joints.
+    It is all True for an open system and for a model in tree coordinates.
+
+    Args:
+        model: model in the independent or tree coordinates of `model.system`.
+        samples: motion of all joints, or of the independent joints. Its mask `regular` is returned
+            if it is set.
 
     Raises:
         ModelError: more than half of the samples are close to singular configurations.
@@ -143,7 +169,12 @@ def led_samples(model: Any, samples: Samples) -> npt.NDArray[np.bool_]:
 
 
 def with_regular(model: Any, samples: Samples) -> Samples:
-    """Return the samples with the mask `regular` set, so that variants of the motion reuse it."""
+    """Return the samples with their mask `regular` set, so that it is computed only once.
+
+    Args:
+        model: model in the independent or tree coordinates of `model.system`.
+        samples: motion of all joints, or of the independent joints.
+    """
     return replace(samples, regular=led_samples(model, samples))
 
 
@@ -257,6 +288,9 @@ class Observations:
     def select(self, names: Sequence[str]) -> Observations:
         """Return the equations with only the named columns; other parameters are assumed zero.
 
+        Args:
+            names: names of parameters, in the order of the new columns.
+
         Raises:
             ModelError: a name is unknown.
         """
@@ -293,13 +327,21 @@ class Observations:
         return self._rows_of(first), self._rows_of(~first)
 
     def parts(self, count: int) -> Iterator[tuple[Observations, Observations]]:
-        """Yield, for each of `count` equal parts of the record, the other parts and that part."""
+        """Yield, for each of `count` equal parts of the record, the other parts and that part.
+
+        Args:
+            count: number of parts.
+        """
         number = np.arange(len(self.time)) * count // len(self.time)
         for k in range(count):
             yield self._rows_of(number != k), self._rows_of(number == k)
 
     def at(self, time: Array) -> Observations:
-        """Return the equations at these instants [s], which must be elements of `self.time`."""
+        """Return the equations at some of the instants.
+
+        Args:
+            time: instants [s], which must be elements of `self.time`; others are ignored.
+        """
         return self._rows_of(np.isin(self.time, time))
 
     def _rows_of(self, keep: npt.NDArray[np.bool_]) -> Observations:
@@ -328,7 +370,7 @@ def observe(regressor: Any, samples: Samples) -> Observations:
 
 
 def _observe(regressor: Any, samples: Samples) -> Observations:
-    """Return the equations of every instant, interpolated close to singular configurations."""
+    """Return the equations of every sample, interpolated close to singular configurations."""
     return Observations(
         samples.time,
         evaluated(regressor, samples)[0],
@@ -387,14 +429,14 @@ def observe_filtered(
 def clear_of_singular(
     found: Observations, model: Any, samples: Samples, before: float, after: float | None = None
 ) -> Observations:
-    """Drop the equations whose filter or interval window contains near-singular samples.
+    """Return the equations whose time window contains no sample close to a singular configuration.
 
     Args:
         found: equations of the samples.
         model: model with which the singular configurations are found.
         samples: the complete samples.
-        before: length of the time window after the instant of an equation [s].
-        after: length of the time window before it [s]. The default is the same length.
+        before: length of the window after the instant of an equation [s].
+        after: length of the window before that instant [s]. The default is the same length.
     """
     bad = samples.time[~led_samples(model, samples)]
     keep = without(found.time, bad, before, before if after is None else after)
@@ -478,7 +520,10 @@ def observe_energy(energy: Any, power: Any, samples: Samples, interval: float) -
 
 
 def _integral(values: Array, rate: float) -> Array:
-    """Return the cumulative integral from the first sample, by the trapezoidal rule."""
+    """Return the cumulative integral of values (n, ...) over time by the trapezoidal rule.
+
+    `rate` is the sampling rate [Hz]; the integral is zero at the first sample.
+    """
     parts = (values[1:] + values[:-1]) / (2 * rate)
     return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(parts, axis=0)])
 
@@ -560,17 +605,26 @@ INTERVALS = 1.0
 
 
 def _dynamic(system: System, samples: Samples, bandwidth: float, options: Any) -> Observations:
-    """Return the equations of the dynamic model, with the same filter on both sides."""
+    """Return the equations of the dynamic model, with the same filter on both sides.
+
+    `bandwidth` is unused, because the samples contain it; `options` are those of `columns_of`.
+    """
     return observe_filtered(regressor(system, **options), samples)
 
 
 def _filter(system: System, samples: Samples, bandwidth: float, options: Any) -> Observations:
-    """Return the equations of the filtered model with the bandwidth as corner frequency."""
+    """Return the equations of the filtered model with the bandwidth [Hz] as corner frequency.
+
+    `options` are those of `columns_of`.
+    """
     return observe_momentum(filtered_regressor(system, **options), samples, 2 * np.pi * bandwidth)
 
 
 def _energy(system: System, samples: Samples, bandwidth: float, options: Any) -> Observations:
-    """Return the equations of the energy model, with intervals of one period of the bandwidth."""
+    """Return the equations of the energy model, with intervals of one period of the bandwidth [Hz].
+
+    `options` are those of `columns_of`.
+    """
     models = energy_regressor(system, **options), power_regressor(system, **options)
     return observe_energy(*models, samples, 1 / (INTERVALS * bandwidth))
 
@@ -619,7 +673,7 @@ class ExcitationQuality:
 
     @property
     def sentence(self) -> str:
-        """Description of the unidentifiable parameters, or an empty text."""
+        """Names of the parameters that are not identifiable, as text; empty if there are none."""
         parts = []
         if self.unseen:
             parts.append(f"{_list(self.unseen)} cannot be seen at all")
@@ -632,9 +686,13 @@ def excitation_quality(observations: Observations) -> ExcitationQuality:
     """Return the condition number of the observations and the parameters they do not determine.
 
     Zero columns are removed first. The other columns are scaled to unit length, since otherwise
-    rounding errors would count as independent columns.
+    rounding errors would count as independent columns. Condition numbers are infinite if a
+    parameter is not identifiable.
 
     Source: Gautier 1991 (numerical rank); Presse & Gautier 1993 (condition number).
+
+    Args:
+        observations: equations y = W K.
     """
     R = triangle(observations.rows[0])
     names = np.array(observations.names)
@@ -657,7 +715,10 @@ def excitation_quality(observations: Observations) -> ExcitationQuality:
 
 
 def require_visible(observations: Observations) -> ExcitationQuality:
-    """Return the excitation quality of observations that determine every parameter.
+    """Return the excitation quality of observations; raise if a parameter is not identifiable.
+
+    Args:
+        observations: equations y = W K.
 
     Raises:
         ModelError: there are fewer equations than parameters, or some parameters are not
@@ -681,6 +742,6 @@ def require_visible(observations: Observations) -> ExcitationQuality:
 
 
 def _list(names: tuple[str, ...]) -> str:
-    """Return a list of names as text; long lists are shortened."""
+    """Return names as text, separated by commas; names after the eighth are only counted."""
     more = len(names) - _LISTED
     return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")

@@ -166,7 +166,8 @@ def map_source(
 def _tables(mapped: Mapped, columns: Columns, buffers: Sequence[tuple[int, int]]) -> list[str]:
     """Return C tables with the destination of each column, for each output of a map.
 
-    `buffers` contains the index in `out` and the column length of each output.
+    `columns` are the columns that are written to an output directly. `buffers` contains the index
+    in `out` and the column length of each output of the map.
     """
     lines = []
     for k, (port, (buffer, size)) in enumerate(zip(mapped.outputs, buffers, strict=True)):
@@ -179,7 +180,7 @@ def _tables(mapped: Mapped, columns: Columns, buffers: Sequence[tuple[int, int]]
 
 
 def _inputs(graph: Graph, mapped: Mapped) -> list[str]:
-    """Return the C expression of the pointer to each input of the current columns."""
+    """Return the C expressions of the pointers to the inputs of a map at the current columns."""
     result = []
     for k, port in enumerate(graph.inputs):
         text = f"out[{mapped.inputs[k]}]"
@@ -234,6 +235,7 @@ def kernel_source(functions: Iterable[Function], block: int = BLOCK) -> dict[str
 
 
 def _file(function: Function, block: int) -> str:
+    """Return the text of the C file of a Function."""
     stages = staged(function) or StagedFunction(function, ())
     graph = graph_of(stages.scalar)
     scheduling = _GCC if len(graph.nodes) <= _SHORT else ""
@@ -241,7 +243,10 @@ def _file(function: Function, block: int) -> str:
 
 
 def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: int) -> list[str]:
-    """Return the C functions of a Function: of its scalar operations and maps, and its entry."""
+    """Return the C functions of a Function: its scalar operations, its maps, and its entry.
+
+    `graph` contains the scalar operations; `block` is the maximum of assignments per C function.
+    """
     name = function.name()
     late = {port: k + 1 for k, m in enumerate(maps) for port in m.outputs}
     pieces = _pieces(graph, late, len(maps), block)
@@ -270,7 +275,10 @@ def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: i
 
 
 def _pieces(graph: Graph, late: dict[int, int], maps: int, block: int) -> list[list[list[Item]]]:
-    """Return the blocks before the first map, between the first and the second map, and so on."""
+    """Return the blocks before the first map, between the first and the second map, and so on.
+
+    `late` maps a graph input to the number of maps after which it is known.
+    """
     phase = phases(graph, late)
     order = schedule(graph, phase)
     every: list[list[Step]] = [[] for _ in range(maps + 1)]
@@ -315,6 +323,9 @@ class LoopCode(NamedTuple):
     def library(self, further: Mapping[str, str]) -> Path:
         """Return the library of this code and of additional C files.
 
+        Args:
+            further: file name to text of the additional files.
+
         Raises:
             CompilerError: there is no compiler, or it rejects the code.
         """
@@ -347,7 +358,10 @@ def kernel_library(
 
 @functools.cache
 def processor() -> str:
-    """Return the model and features of the processor; code is valid for an equal text only."""
+    """Return text that identifies model and features of the processor of this computer.
+
+    Fast code is valid only on processors with an equal text.
+    """
     try:
         lines = Path("/proc/cpuinfo").read_text("utf-8", "replace").splitlines()
     except OSError:
@@ -393,6 +407,9 @@ def indexed_library(key: str, make: Callable[[], Path | None]) -> Path | None:
         key: key from `index_key`.
         make: callable that writes and compiles the library. It returns None if that is
             impossible, which is not stored.
+
+    Returns:
+        path of the library; None if `make` returns None.
     """
     folder = cache_dir()
     entry = folder / f"{key}{_SUFFIX}"
@@ -416,7 +433,7 @@ def _entry(entry: Path) -> Path | None:
 
 
 def _write(entry: Path, name: str) -> None:
-    """Store the library name. If the write fails, the next call generates the C text again."""
+    """Write the library name to an index entry; if that fails, the C text is generated again."""
     try:
         with tempfile.TemporaryDirectory(dir=entry.parent, prefix=BUILD) as folder:
             written = Path(folder) / entry.name
@@ -427,6 +444,7 @@ def _write(entry: Path, name: str) -> None:
 
 
 def _index_key(text: str, options: str) -> str:
+    """Return hash of everything that determines the code: compiler, flags, generator, Function."""
     compiler = find_compiler()
     facts = (casadi.CasadiMeta.version(), *compiler.command, compiler.version, processor())
     digest = hashlib.sha256()
@@ -438,7 +456,7 @@ def _index_key(text: str, options: str) -> str:
 
 @functools.cache
 def _writer() -> str:
-    """Return a hash of the code generator: another version may generate different text."""
+    """Return a hash of the files of the code generator, as part of cache keys."""
     digest = hashlib.sha256()
     for package in ("mbs.native", "mbs.operations"):
         for name, data in sorted(_files(resources.files(package), package)):
@@ -447,6 +465,7 @@ def _writer() -> str:
 
 
 def _files(folder: Traversable, path: str) -> Iterator[tuple[str, bytes]]:
+    """Yield path and content of the source files in a folder and its subfolders."""
     for item in folder.iterdir():
         if item.is_dir() and item.name != "__pycache__":
             yield from _files(item, f"{path}/{item.name}")

@@ -36,10 +36,13 @@ _WRITTEN = ELEMENTWISE | {casadi.OP_INPUT, casadi.OP_OUTPUT, casadi.OP_CONST}
 
 
 def is_scalar(function: Function) -> bool:
-    """Return whether a Function consists of scalar operations that C has, without an expansion.
+    """Whether a Function consists of scalar operations that C has, without an expansion.
 
     The values of its C code are then bit-identical to the interpreted Function. An expansion may
     simplify operations, which changes the last bits.
+
+    Args:
+        function: any Function.
     """
     operations = range(function.n_instructions()) if function.is_a("SXFunction") else ()
     return bool(operations) and all(function.instruction_id(k) in _WRITTEN for k in operations)
@@ -77,7 +80,7 @@ def plain_source(
 
 
 def external_source(functions: Iterable[Function]) -> str:
-    """Return the functions of `plain_source` with those that CasADi's `external` looks up.
+    """Return the C code of `plain_source` and the functions by which CasADi's `external` loads it.
 
     Args:
         functions: Functions of scalar operations with different names.
@@ -133,7 +136,10 @@ def plain_flags(source: str) -> tuple[str, ...]:
 
 
 def _body(function: Function, real: Real, block: int, least: int) -> GraphCode:
-    """Return the C functions of a Function, in the order of its operations."""
+    """Return the C functions of a Function, in the order of its operations.
+
+    `real` is the C type of numbers; `block` and `least` are as in `plain_source`.
+    """
     graph = graph_of(function)
     pieces = blocks(graph, with_calls(graph, plain_order(graph), least), block)
     code = (BlockCode if real == "double" else FloatCode)(graph, slots(graph, pieces), "")
@@ -141,7 +147,10 @@ def _body(function: Function, real: Real, block: int, least: int) -> GraphCode:
 
 
 def _hosted(function: Function, linkage: str, block: int, least: int) -> tuple[list[str], WorkSize]:
-    """Return the C functions of a Function whose arguments may be NULL, and the work sizes."""
+    """Return the C lines of a Function whose arguments may be NULL, and its work sizes.
+
+    `linkage` is the text before the type; `block` and `least` are as in `plain_source`.
+    """
     body = _body(function, "double", block, least)
     memory = Memory(function, body.code.graph, body.code.where.count)
     lines = [*memory.declarations(), *body.calls()]

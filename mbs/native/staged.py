@@ -64,6 +64,9 @@ def staged(function: Function) -> StagedFunction | None:
     Returns:
         the stages; None if the Function contains no map, or an operation between the maps that
         is not scalar or not supported.
+
+    Args:
+        function: any Function.
     """
     if not any(f.class_name() in _MAPS for f in (function, *function.find_functions())):
         return None
@@ -116,7 +119,10 @@ class _Trace:
     maps: list[Mapped] = field(default_factory=list)
 
     def called(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
-        """Return the outputs of a Function for symbolic arguments."""
+        """Return the outputs of a Function for symbolic arguments; its maps are recorded.
+
+        Raises ModelError for operations that are not supported.
+        """
         if function.class_name() in _MAPS:
             return self._map(function, arguments)
         if function.is_a("MXFunction"):
@@ -126,6 +132,7 @@ class _Trace:
         raise ModelError(f"{function.name()} is not made of scalar operations")
 
     def _interpret(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
+        """Return the outputs of an MX Function by executing its instructions on symbols."""
         work: dict[int, _Value] = {}
         results = [[SX(0)] * function.nnz_out(k) for k in range(function.n_out())]
         for k in range(function.n_instructions()):
@@ -149,6 +156,7 @@ class _Trace:
         ]
 
     def _step(self, op: int, node: MX, arguments: list[_Value]) -> Sequence[_Value]:
+        """Return results of one instruction of an MX Function, with CasADi operation code `op`."""
         if op == casadi.OP_CALL:
             return self.called(node.which_function(), arguments)
         if op == casadi.OP_HORZREPMAT:
@@ -167,6 +175,7 @@ class _Trace:
         return [SX(_MOVES[op](node, values))]
 
     def _map(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
+        """Record a map and return its outputs as new symbols."""
         column, columns = function, 1
         while column.class_name() in _MAPS:
             facts = column.info()
@@ -190,6 +199,7 @@ class _Trace:
 
 
 def _whole(value: _Value) -> SX:
+    """Return a value as a matrix, with repetitions written out."""
     return casadi.repmat(value.value, 1, value.times) if isinstance(value, _Tiled) else value
 
 
@@ -209,7 +219,10 @@ def _elements(value: SX) -> SX:
 
 
 def _in_lanes(value: SX, rows: int, columns: int) -> SX:
-    """Reorder columns into groups of LANES, row by row; zeros pad the last group."""
+    """Return the elements of columns in groups of LANES, row by row, as a vector.
+
+    `value` has `rows` nonzero elements per column; zeros pad the last group.
+    """
     elements = casadi.vertcat(_elements(value), 0)
     indices = [
         column * rows + row if column < columns else rows * columns
@@ -221,7 +234,10 @@ def _in_lanes(value: SX, rows: int, columns: int) -> SX:
 
 
 def _select(node: MX, values: list[SX]) -> SX:
-    """Return selected non-zero elements of a matrix with the sparsity of the node."""
+    """Return selected nonzero elements of `values[0]` with the sparsity of the node.
+
+    Raises ModelError if the selection leaves elements out.
+    """
     facts, pattern = node.info(), node.sparsity()
     if "nz" in facts:
         indices = list(facts["nz"])
@@ -236,6 +252,7 @@ def _select(node: MX, values: list[SX]) -> SX:
 
 
 def _range(slice_: Mapping[str, int]) -> range:
+    """Return the range of a CasADi slice, a dict with start, stop and step."""
     return range(slice_["start"], slice_["stop"], slice_["step"])
 
 

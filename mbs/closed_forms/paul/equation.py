@@ -93,7 +93,7 @@ class Equation:
         return all(sum(abs(power) for power in key) <= 1 for key in self.parts)
 
     def at(self, key: Key) -> Values:
-        """Return the values of a coefficient; zero if the equation does not have it."""
+        """Return the values (samples,) of the coefficient with this key; zero if there is none."""
         part = self.parts.get(key)
         return np.zeros(1, dtype=complex) if part is None else part.values
 
@@ -124,7 +124,7 @@ def equations(knowledge: KnownFrames, most: int = PRODUCTS) -> tuple[Equation, .
 
 
 def _mark(equation: Equation) -> object:
-    """Return a hashable mark that is equal for equations that are multiples of each other."""
+    """Return a hashable value that is equal for equations that are multiples of each other."""
     keys = sorted(equation.parts)
     samples = max(len(part.values) for part in equation.parts.values())
     table = np.stack([np.broadcast_to(equation.parts[key].values, samples) for key in keys])
@@ -134,7 +134,7 @@ def _mark(equation: Equation) -> object:
 
 
 def _leading(table: Values) -> NDArray[np.float64]:
-    """Return a number per sample that changes sign with the column and is not small."""
+    """Return a number per sample (column) that changes sign with the column and is not small."""
     parts = np.concatenate([table.real, table.imag])
     largest = np.max(np.abs(parts), axis=0)
     # a value near zero must not decide; of values that are equal up to rounding, take the first
@@ -149,7 +149,10 @@ def _equation(
     prismatic: frozenset[int],
     sums: list[tuple[Members, NDArray[np.float64]]],
 ) -> Equation | None:
-    """Return the equation of some terms with its variables; None if they are too many."""
+    """Return the equation of `terms` with its variables; None if there are too many variables.
+
+    `sums` are known sums of angles, with their values at the samples, which are removed.
+    """
     reduced = dict[Members, tuple[Values, list[Source]]]()
     for term, given in terms.items():
         turns = any(k not in prismatic for k, _ in term)
@@ -181,7 +184,10 @@ def _fold(
     prismatic: frozenset[int],
     sums: list[tuple[Members, NDArray[np.float64]]],
 ) -> tuple[Members, Source, Values]:
-    """Remove the known sums of angles from a term; return the remaining term and its values."""
+    """Remove the known sums of angles from a term; return the remaining term and its values.
+
+    `values` (samples,) are the coefficients of the term, `sums` as in `_equation`.
+    """
     rest, known = term, list[tuple[int, int]]()
     for number, (members, at) in enumerate(sums):
         powers = dict(rest)
@@ -202,7 +208,7 @@ def _fold(
 
 
 def _variables(terms: list[Members], prismatic: frozenset[int]) -> tuple[Variable, ...]:
-    """Return the variables: joints, with joints merged whose angles have a constant ratio."""
+    """Return the variables of terms; joints whose angles have a constant ratio are one variable."""
     columns = dict[int, list[int]]()
     for number, term in enumerate(terms):
         for k, power in term:
@@ -246,14 +252,18 @@ class RingMatrices:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Factor:
-    """Coefficients of X cos(angle) + Y sin(angle); X alone without an angle."""
+    """Coefficients of X cos(angle) + Y sin(angle), or of X alone for a term without angle."""
 
     X: SX
     Y: SX
 
 
 def ring_matrices(ring: Ring) -> RingMatrices:
-    """Return the matrices of the known transforms of a loop."""
+    """Return the matrices (15, 15) of the known transforms of a loop.
+
+    Args:
+        ring: loop chain.
+    """
     poses = [gap.pose for gap in ring.gaps]
     opposite = [gap.inverse().pose for gap in ring.gaps]
     on = tuple(map(represented_pose, poses, opposite))
@@ -266,7 +276,14 @@ def ring_matrices(ring: Ring) -> RingMatrices:
 
 
 def factor(knowledge: KnownFrames, matrices: RingMatrices, equation: Equation, key: Key) -> Factor:
-    """Return the coefficient of a product of the variables (key) of an equation, as expression."""
+    """Return the coefficient of a product of variables in an equation, as an expression.
+
+    Args:
+        knowledge: known joints and sums.
+        matrices: matrices of the known transforms.
+        equation: equation with numeric coefficients.
+        key: powers of the variables, for angles their multiples.
+    """
     total, part = Factor(SX(0), SX(0)), equation.parts.get(key)
     if part is None:
         return total
@@ -291,7 +308,7 @@ def _rotate(own: Factor, angle: SX, conjugate: bool) -> Factor:
 def _own(
     knowledge: KnownFrames, matrices: RingMatrices, equation: Equation, term: Members
 ) -> Factor:
-    """Return X and Y of one product of powers of the joints."""
+    """Return X and Y of the product of joint powers `term` in an equation."""
     joints = knowledge.ring.joints
     prismatic = {k: power for k, power in term if not joints[k].is_rotational}
     angles = [(k, sign) for k, sign in term if joints[k].is_rotational]
@@ -313,7 +330,10 @@ def _has_partner(
     angles: list[tuple[int, int]],
     term: Members,
 ) -> bool:
-    """Whether the equation has a term of the same joints with other signs."""
+    """Whether the equation contains another term of the same joints with other signs of angles.
+
+    `prismatic` maps joints to powers, `angles` are pairs of joint and sign, both of `term`.
+    """
     pattern = {k for k, _ in angles} | set(prismatic)
     return any(
         other != term
@@ -329,7 +349,10 @@ def _mix(
     row: SplitRow,
     term: tuple[Mapping[int, int], list[tuple[int, int]]],
 ) -> Factor:
-    """Return G = X - i Y from all products of cosines and sines of the joints of a term."""
+    """Return G = X - i Y of a term from all products of cosines and sines of its joints.
+
+    `term` is the powers of prismatic joints, and the pairs of joint and sign of revolute joints.
+    """
     prismatic, angles = term
     X, Y = SX(0), SX(0)
     for choice in product((1, 2), repeat=len(angles)):
@@ -376,9 +399,10 @@ def _along(
     path: tuple[SplitRow, list[tuple[str, int]], int],
     chosen: Mapping[int, int],
 ) -> SX:
-    """Return the element of w at the end of a path through joints and known transforms.
+    """Return an element of w at the end of a path through joints and known transforms.
 
-    The vector w (15,) contains products of origin and z axis of a frame.
+    `path` is the row, its steps and the direction; `chosen` is as in `_coefficient`. The vector w
+    (15,) contains products of origin and z axis of a frame.
     """
     row, steps, direction = path
     r = SX(1, SIZE)
@@ -395,7 +419,10 @@ def _along(
 
 
 def _joint(knowledge: KnownFrames, k: int, number: int, direction: int) -> SX:
-    """Return one basis matrix of an unknown joint, or the matrix of a known joint."""
+    """Return the matrix (15, 15) of joint k at its known position.
+
+    For an unknown joint, it is the basis matrix with index `number`.
+    """
     joint = knowledge.ring.joints[k]
     sign = direction * joint.sign
     if k not in knowledge.known:
@@ -408,6 +435,6 @@ def _joint(knowledge: KnownFrames, k: int, number: int, direction: int) -> SX:
 
 @cache
 def _sparse_basis(turns: bool, sign: int) -> tuple[SX, SX, SX]:
-    """Return the basis matrices of a joint that moves with or against the path."""
+    """Return three basis matrices of a joint that moves with (sign 1) or against the path (-1)."""
     one, first, second = (SX(casadi.sparsify(DM(matrix))) for matrix in joint_basis(not turns))
     return (one, first, sign * second) if turns else (one, sign * first, second)

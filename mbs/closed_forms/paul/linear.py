@@ -33,7 +33,11 @@ _ROWS = {1: 24, 2: 16, 3: 10, 4: 9, 5: 8, 6: 8}
 
 
 def linear(stage: PaulStage) -> Iterator[Candidate]:
-    """Yield steps that solve as many linear equations as unknown columns."""
+    """Yield steps that solve as many linear equations as unknown lengths, cosines and sines.
+
+    Args:
+        stage: known quantities and equations.
+    """
     rows = [equation for equation in stage.equations if equation.linear]
     for variables in dict.fromkeys(equation.variables for equation in rows):
         inside = [e for e in rows if set(e.variables) <= set(variables)]
@@ -50,14 +54,25 @@ def linear(stage: PaulStage) -> Iterator[Candidate]:
 
 
 def columns(variables: Variables) -> list[tuple[Variable, str]]:
-    """Return the unknown columns of linear equations: a length, or cosine and sine of an angle."""
+    """Return the unknown columns of linear equations, as pairs of variable and kind.
+
+    Kind "r" is a length, "c" the cosine and "s" the sine of an angle.
+
+    Args:
+        variables: unknowns of the equations.
+    """
     return [
         (variable, kind) for variable in variables for kind in ("r" if variable.prismatic else "cs")
     ]
 
 
 def key_of(variable: Variable, equation: Equation) -> Key | None:
-    """Return the key of a variable alone in an equation; None if the equation has no such term."""
+    """Return the key of the term of a variable alone; None if the variable is not in the equation.
+
+    Args:
+        variable: unknown.
+        equation: equation.
+    """
     if variable not in equation.variables:
         return None
     at = equation.variables.index(variable)
@@ -65,7 +80,12 @@ def key_of(variable: Variable, equation: Equation) -> Key | None:
 
 
 def row_values(equation: Equation, variables: Variables) -> Matrix:
-    """Return the numeric coefficients (samples, columns) of an equation's variables."""
+    """Return the numeric coefficients (samples, columns) of variables in a linear equation.
+
+    Args:
+        equation: equation.
+        variables: unknowns, which define the `columns`.
+    """
     values = []
     for variable, kind in columns(variables):
         key = key_of(variable, equation)
@@ -75,7 +95,13 @@ def row_values(equation: Equation, variables: Variables) -> Matrix:
 
 
 def row_factors(stage: PaulStage, equation: Equation, variables: Variables) -> list[SX]:
-    """Return the coefficients of an equation and its constant, as expressions."""
+    """Return the symbolic coefficients of variables in a linear equation, then its constant.
+
+    Args:
+        stage: known quantities and equations.
+        equation: equation.
+        variables: unknowns, which define the `columns`.
+    """
     factors = list[SX]()
     for variable in variables:
         key = key_of(variable, equation)
@@ -90,7 +116,10 @@ def row_factors(stage: PaulStage, equation: Equation, variables: Variables) -> l
 def _best(
     rows: list[Equation], variables: Variables
 ) -> list[tuple[tuple[Equation, ...], tuple[float, ...]]]:
-    """Return the best selections of rows: constant determinant, cheap, well conditioned."""
+    """Return the best selections of rows that determine the variables, with their sort keys.
+
+    A constant determinant is preferred, then low cost, then good conditioning.
+    """
     width = len(columns(variables))
     first = sorted(rows, key=lambda e: e.cost)[: _ROWS.get(width, 0)]
     if len(first) < width:
@@ -112,7 +141,7 @@ def _best(
 
 
 def _built(stage: PaulStage, rows: tuple[Equation, ...], variables: Variables) -> SequenceStep:
-    """Return the step that solves the rows by Cramer's rule."""
+    """Return the step that solves the rows for the variables by Cramer's rule."""
     table = [row_factors(stage, row, variables) for row in rows]
     A = casadi.vertcat(*(casadi.horzcat(*row[:-1]) for row in table))
     b = casadi.vertcat(*(-row[-1] for row in table))
@@ -158,7 +187,10 @@ def _cramer(A: SX, b: SX) -> tuple[SX, list[SX]]:
 def _text(
     stage: PaulStage, table: list[list[SX]], variables: Variables
 ) -> tuple[dict[str, SX], str]:
-    """Return named coefficients of linear equations, and the equations as text."""
+    """Return the named coefficients of linear equations, and the equations as text.
+
+    `table` contains the symbolic coefficients of each equation.
+    """
     named, lines = dict[str, SX](), list[str]()
     for letter, row in zip(_letters(len(table)), table, strict=True):
         pieces, right = list[str](), "0"

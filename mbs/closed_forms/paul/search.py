@@ -26,7 +26,13 @@ from mbs.spatial import Pose, vector
 
 
 def sums(stage: PaulStage) -> Iterator[Candidate]:
-    """Yield steps that subtract known angles, or another known sum, from a known sum."""
+    """Yield steps that determine a single angle from known sums of angles.
+
+    Known angles, or another known sum, are subtracted from a known sum.
+
+    Args:
+        stage: known quantities and equations.
+    """
     for rest, value, text in _alone(stage):
 
         def build(rest: Variable = rest, value: SX = value, text: str = text) -> SequenceStep:
@@ -57,12 +63,12 @@ def _alone(stage: PaulStage) -> Iterator[tuple[Variable, SX, str]]:
 
 
 def _angle(knowledge: KnownFrames, k: int) -> Variable:
-    """Return the variable of a single joint k: its angle, or its displacement."""
+    """Return the variable of joint k: its angle or its displacement."""
     return Variable(not knowledge.ring.joints[k].is_rotational, ((k, 1),))
 
 
 def _combine(first: Variable, second: Variable, sense: int) -> dict[int, int]:
-    """Return the signs of the joints in the sum first + sense second, by joint.
+    """Return the signs of the joints in the sum first + sense * second, by joint index.
 
     Empty if a coefficient is not 1 or -1.
     """
@@ -73,7 +79,7 @@ def _combine(first: Variable, second: Variable, sense: int) -> dict[int, int]:
 
 
 def _unit(total: dict[int, int]) -> bool:
-    """Whether all coefficients of a sum of angles are -1, 0 or 1."""
+    """Whether all coefficients of a sum of angles, by joint, are -1, 0 or 1."""
     return all(abs(sign) <= 1 for sign in total.values())
 
 
@@ -85,10 +91,13 @@ def _unit(total: dict[int, int]) -> bool:
 
 
 def at_feet(problem: Problem) -> Ring:
-    """Return the loop of a problem, with the frame of each rotational joint moved along its axis.
+    """Return the loop of a problem, with the frame of each revolute joint moved along its axis.
 
     The new origin is the foot of the common normal with the next axis. The first transform of the
     loop, which contains the known pose, is not used for this.
+
+    Args:
+        problem: loop and samples.
     """
     ring = problem.ring
     for k in range(len(ring.joints) - 1):
@@ -99,7 +108,10 @@ def at_feet(problem: Problem) -> Ring:
 
 
 def _moved(problem: Problem, ring: Ring, k: int) -> Ring:
-    """Return the loop with the origin of joint k at the foot of the normal to the next axis."""
+    """Return the loop with the origin of joint k at the foot of the normal to the next axis.
+
+    The same object is returned if the axes are parallel or the origin is there already.
+    """
     pose = ring.gaps[k + 1].pose
     axis, cosine = pose.R[:, 2], pose.R[2, 2]
     sine2 = axis[0] ** 2 + axis[1] ** 2
@@ -158,7 +170,10 @@ def paul(problem: Problem) -> StepSequence:
 
 
 def _cheapest(stage: PaulStage) -> tuple[SequenceStep, tuple[Variable, ...]] | None:
-    """Return the step with the fewest operations among the candidates of the lowest rank."""
+    """Return the step with the fewest operations among the candidates of the lowest rank.
+
+    The second result is the variables that it solves. None if there is no candidate.
+    """
     for kernels in _KERNELS:
         every = [
             candidate
@@ -185,7 +200,7 @@ def _require_simple(problem: Problem) -> None:
 
 
 def _refusal(stage: PaulStage, steps: Sequence[SequenceStep]) -> str:
-    """Return text with the unsolved joints and the simplest equations that contain them."""
+    """Return an error message with the unsolved joints and the equations that contain them."""
     knowledge = stage.knowledge
     left = ", ".join(knowledge.ring.joints[k].name for k in knowledge.unknown)
     given = ", ".join(name for step in steps for name in step.names)
@@ -194,7 +209,7 @@ def _refusal(stage: PaulStage, steps: Sequence[SequenceStep]) -> str:
 
 
 def _simplest(stage: PaulStage) -> str:
-    """Return text with the unknowns of the simplest equations that remain unsolved."""
+    """Return text with the unknowns of the simplest equations that no solution type fits."""
     if not stage.equations:
         return "every equation of every split of the loop has more than two unknowns"
     groups = dict.fromkeys(

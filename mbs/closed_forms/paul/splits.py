@@ -85,27 +85,27 @@ class KnownFrames:
         return [k for k in range(len(self.ring.joints)) if k not in self.known]
 
     def index(self, variable: Variable) -> int:
-        """Return the index of a variable in x. A sum of angles gets the next free index."""
+        """Return the index in x of a variable. A sum of angles gets the next free index."""
         if variable.single:
             index = self.ring.joints[variable.members[0][0]].index
             return -1 if index is None else index
         return self.problem.size + len(self.sums)
 
     def can_hold(self, variable: Variable) -> bool:
-        """Whether a variable is new, and the vector x of unknowns has a free index for it."""
+        """Whether a variable can become known: it is new, and x has a free index for a sum."""
         held = [known.members for known, _, _ in self.open_sums()]
         return variable.single or (
             variable.members not in held and self.index(variable) < self.problem.x.numel()
         )
 
     def name(self, variable: Variable) -> str:
-        """Return the name of a variable in an equation."""
+        """Return the name of a variable: the name of its joint, or of the symbol of a sum."""
         if variable.single:
             return self.ring.joints[variable.members[0][0]].name
         return str(self.problem.x[self.index(variable)])
 
     def with_joint(self, variable: Variable) -> KnownFrames:
-        """Return a copy in which one more variable is known."""
+        """Return a copy in which the variable is known too."""
         if variable.single:
             return replace(self, known=self.known | {variable.members[0][0]})
         return replace(self, sums=(*self.sums, (variable, self.index(variable))))
@@ -115,12 +115,15 @@ class KnownFrames:
         return [_rest(self, *known) for known in self.sums]
 
     def position(self, k: int) -> SX:
-        """Return the symbol of joint k."""
+        """Return the symbol of the position of joint k."""
         return SX(self.problem.x[self.index(Variable(False, ((k, 1),)))])
 
 
 def _rest(knowledge: KnownFrames, variable: Variable, index: int) -> tuple[Variable, SX, Matrix]:
-    """Return a known sum without its known members: variable, expression, values at samples."""
+    """Return the unknown part of a known sum of angles: variable, expression, values at samples.
+
+    `variable` is the sum and `index` its index in x.
+    """
     value = SX(knowledge.problem.x[index])
     members = [member for member in variable.members if member[0] not in knowledge.known]
     for k, sign in variable.members:
@@ -135,12 +138,17 @@ def _rest(knowledge: KnownFrames, variable: Variable, index: int) -> tuple[Varia
 
 
 def beginning(problem: Problem, ring: Ring) -> KnownFrames:
-    """Return the state at the start of a search, with no known joint."""
+    """Return the known quantities at the start of a search: none.
+
+    Args:
+        problem: loop and samples.
+        ring: loop chain with the same joints and chosen frame origins.
+    """
     return KnownFrames(problem, ring, _samples(problem, ring))
 
 
 def _samples(problem: Problem, ring: Ring) -> LoopSamples:
-    """Return the loop transforms and positions at the random configurations of the problem.
+    """Return transforms and positions of the loop chain at the samples of the problem.
 
     Lengths are divided by the mean length of the transforms.
     """
@@ -188,7 +196,12 @@ def represented(T: Matrix) -> Matrix:
 
 
 def represented_pose(pose: Pose, opposite: Pose) -> SX:
-    """Return the matrix (15, 15) of a pose, sparse; `opposite` is its inverse, maybe shorter."""
+    """Return the matrix (15, 15) of a pose that acts on w, as a sparse expression.
+
+    Args:
+        pose: pose of a frame.
+        opposite: its inverse, whose expressions may be shorter.
+    """
     R, t, back = pose.R, pose.p, -opposite.p
     tt = min((casadi.sumsqr(p) for p in (t, opposite.p)), key=casadi.n_nodes)
     cross = casadi.skew(t)
@@ -288,7 +301,11 @@ class FrameSplit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pieces:
-    """Matrices of the unknown joints and of the transforms between them, in one representation."""
+    """Matrices on w, or on directions only, from which the sides of equations are multiplied.
+
+    `joints` are the unknown joints, `gaps` and `back` transforms between them in both directions,
+    `turns` and `turns_back` the joint factors of `_basis` in both directions.
+    """
 
     joints: list[int]
     gaps: list[Matrix]
@@ -299,7 +316,11 @@ class _Pieces:
 
 
 def splits(knowledge: KnownFrames) -> Iterator[FrameSplit]:
-    """Yield each split of the loop with few unknown joints on each side."""
+    """Yield each split of the loop into two sides with few unknown joints each.
+
+    Args:
+        knowledge: known joints and sums.
+    """
     whole = _pieces(knowledge, slice(0, SIZE))
     directions = _pieces(knowledge, _DIRECTION)
     w = np.zeros((SIZE, 1))
@@ -339,7 +360,10 @@ def _of_end(
 
 
 def _rows(axis: int, start: int, prismatic: bool) -> tuple[int, ...]:
-    """Return the elements of w that give new equations: those that joint `start` changes."""
+    """Return the indices in w of the equations that are new if the reference frame is `start`.
+
+    `axis` is the index of the observed axis, and `prismatic` the type of the joint at `start`.
+    """
     after = start % 2 == 1
     if axis == 2:
         return (3, 4, 6, 7, 9, 10, 12, 13) if after and not prismatic else tuple(range(1, SIZE))
@@ -349,7 +373,10 @@ def _rows(axis: int, start: int, prismatic: bool) -> tuple[int, ...]:
 
 
 def _walk_back(pieces: _Pieces, first: Tensor, e: int, turned: bool) -> Mapping[int, Side]:
-    """Return the observed vectors in the frames before joint e, by frame index."""
+    """Return the observed vectors in the frames before joint e, by frame index.
+
+    `first` are the vectors in the frame of joint e; `turned` is whether its motion acts on them.
+    """
     m, found = len(pieces.joints), dict[int, Side]()
     side = Side((), first[..., None])
     if turned:
@@ -367,7 +394,10 @@ def _walk_back(pieces: _Pieces, first: Tensor, e: int, turned: bool) -> Mapping[
 
 
 def _walk_on(pieces: _Pieces, first: Tensor, e: int, turned: bool) -> Mapping[int, Side]:
-    """Return the observed vectors in the frames after joint e, by frame index."""
+    """Return the observed vectors in the frames after joint e, by frame index.
+
+    `first` are the vectors in the frame of joint e; `turned` is whether its motion acts on them.
+    """
     m, found = len(pieces.joints), dict[int, Side]()
     side = Side((), first[..., None])
     if turned:
@@ -392,7 +422,7 @@ def _over(side: Side, matrix: Matrix) -> Side:
 
 
 def _through(side: Side, k: int, basis: Tensor) -> Side:
-    """Return the side multiplied by the basis (3, d, d) of a further joint."""
+    """Return the side multiplied by the factors (3, d, d) of a further unknown joint k."""
     S, d, columns, K = side.values.shape
     moved = basis[:, None] @ side.values.reshape(S, d, -1)
     values = np.moveaxis(moved.reshape(3, S, d, columns, K), 0, -1)
@@ -428,7 +458,10 @@ def _merge(knowledge: KnownFrames, k: int) -> Matrix:
 
 
 def _basis(knowledge: KnownFrames, k: int, direction: int) -> Tensor:
-    """Return factors (3, 15, 15) of e^-iq, 1, e^iq, or of r, 1, r^2."""
+    """Return the factors (3, 15, 15) of e^-iq, 1, e^iq of joint k, or of r, 1, r^2.
+
+    The direction is 1 along the loop and -1 against it.
+    """
     joint = knowledge.ring.joints[k]
     one, first, second = joint_basis(not joint.is_rotational)
     if not joint.is_rotational:
@@ -497,7 +530,7 @@ def simple_rows(
 
 
 def _counts(table: _Table, mask: NDArray[np.bool_]) -> NDArray[np.int_]:
-    """Return per row (3, rows): minimum number of variables, numbers of joints and products."""
+    """Return the numbers (3, rows) of variables (at least), joints and products in masked rows."""
     weights = mask.astype(int)
     joints = (weights @ table.has) > 0
     together = np.zeros(joints.shape, dtype=bool)
@@ -513,7 +546,10 @@ def _collect(
     row: int,
     sign: int,
 ) -> None:
-    """Add the masked terms of a row of a side, times `sign`, to the terms found so far."""
+    """Add `sign` times the terms of a row of a side to `found`, in place.
+
+    `source` is the side, its terms, and a mask of the terms that are not zero.
+    """
     side, terms, mask = source
     for k in np.flatnonzero(mask):
         term = terms[k]
@@ -544,7 +580,7 @@ class _Table:
 
 @lru_cache(maxsize=4096)
 def _table(joints: tuple[int, ...], prismatic: frozenset[int]) -> _Table:
-    """Return the products of powers of joint variables that occur on one side of an equation."""
+    """Return the terms of a side with these joints: products of powers of joint variables."""
     every = list(product((-1, 0, 1), repeat=len(joints)))
     terms = list[Members | None]()
     for row in every:

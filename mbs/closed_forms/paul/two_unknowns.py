@@ -78,7 +78,11 @@ class _Pair:
 
 
 def two_unknowns(stage: PaulStage) -> Iterator[Candidate]:
-    """Yield steps that solve one of two unknowns from two equations."""
+    """Yield steps that solve one of two unknowns from two equations in both.
+
+    Args:
+        stage: known quantities and equations.
+    """
     groups = dict[tuple[Variable, ...], list[Equation]]()
     for equation in stage.equations:
         if len(equation.variables) == 2:
@@ -96,7 +100,10 @@ def two_unknowns(stage: PaulStage) -> Iterator[Candidate]:
 
 
 def _fits(row: Equation, stays: int) -> bool:
-    """Whether an equation is linear in the variable to eliminate and of low degree in the other."""
+    """Whether an equation is linear in the variable to eliminate and of low degree in the other.
+
+    `stays` is the index (0 or 1) of the variable that remains.
+    """
     most = 2 if row.variables[stays].prismatic else 1
     return any(key[1 - stays] for key in row.parts) and all(
         abs(key[1 - stays]) <= 1 and abs(key[stays]) <= most for key in row.parts
@@ -104,6 +111,7 @@ def _fits(row: Equation, stays: int) -> bool:
 
 
 def _candidate(stage: PaulStage, rows: tuple[Equation, Equation], stays: int) -> Candidate | None:
+    """Return the step of two equations with variable `stays` (0 or 1); None if it is impossible."""
     forms = [_form_of_values(row, stays) for row in rows]
     power = _common_power(forms)
     if power is None:
@@ -127,9 +135,9 @@ def _candidate(stage: PaulStage, rows: tuple[Equation, Equation], stays: int) ->
 
 
 def _common_power(forms: Sequence[_Form]) -> int | None:
-    """Return the index of a factor of G that is independent in both forms, or None.
+    """Return the index of a factor of G from which the other unknown follows in both forms.
 
-    The result is None if the other factors do not have the same ratio.
+    None if the factors are dependent, or do not have one ratio.
     """
     first, second = (np.array([re + 1j * im for re, im in _spread(form.G)]) for form in forms)
     sizes = np.min(np.abs(first), axis=1)
@@ -143,7 +151,7 @@ def _common_power(forms: Sequence[_Form]) -> int | None:
 
 
 def _spread(G: list[Complex]) -> list[Complex]:
-    """Return pairs of arrays, all broadcast to one shape."""
+    """Return the pairs of real and imaginary arrays, broadcast to one shape."""
     arrays = np.broadcast_arrays(*(part for pair in G for part in pair))
     return [(arrays[2 * k], arrays[2 * k + 1]) for k in range(len(G))]
 
@@ -159,7 +167,10 @@ def _form_of_values(row: Equation, stays: int) -> _Form:
 
 
 def _form(row: Equation, stays: int, part: Callable[[Key], Complex]) -> _Form:
-    """Return the form of an equation from X and Y of each part."""
+    """Return the form of an equation; `part` returns X and Y of the coefficient with a key.
+
+    `stays` is the index (0 or 1) of the variable y that remains.
+    """
     prismatic = row.variables[stays].prismatic
 
     def key(y: int, q: int) -> Key:
@@ -179,7 +190,10 @@ def _form(row: Equation, stays: int, part: Callable[[Key], Complex]) -> _Form:
 
 
 def _resultant(forms: Sequence[_Form], power: int, prismatic: bool) -> Numbers:
-    """Return the coefficients of the equation in y alone: of 1, y .. y^4, or 1, c, s, c2, s2."""
+    """Return the coefficients of the equation in y alone: of 1, y .. y^4, or 1, c, s, c2, s2.
+
+    `power` is the index of the factor by which the other unknown is eliminated.
+    """
     (x, y), (u, v) = forms[0].G[power], forms[1].G[power]
     n, a, b = x * x + y * y, u * x + v * y, v * x - u * y
     other = [a * one - n * two for one, two in zip(forms[0].B, forms[1].B, strict=True)]
@@ -217,7 +231,7 @@ def _size(G: list[Complex], prismatic: bool) -> Numbers:
 
 
 def _built(stage: PaulStage, pair: _Pair, shares: Any) -> SequenceStep:
-    """Return the step of a pair of equations."""
+    """Return the step of a pair of equations; `shares` masks the nonzero coefficients."""
 
     def forms(row: Equation) -> _Form:
         def part(key: Key) -> Complex:
@@ -252,7 +266,10 @@ def _kind(pair: _Pair) -> str:
 
 
 def _quartic(stage: PaulStage, variable: Variable, F: list[SX], unit: int) -> SequenceStep:
-    """Return the step of a quartic, with four roots."""
+    """Return the step of a quartic with coefficients F and four roots.
+
+    `unit` is the power of a length that is the unit of F.
+    """
     number, shown = stage.number(variable), stage.term(variable)
     signs = SX.sym("sign", 2)
     scale = stage.matrices.length**unit if unit else SX(1)

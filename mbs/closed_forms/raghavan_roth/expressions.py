@@ -85,7 +85,12 @@ def eliminated(A: SX, values: Array, columns: int, rank: int) -> tuple[SX, Array
 
 
 def independent_rows(values: Array, count: int) -> list[int]:
-    """Return ascending indices of `count` rows of (samples, rows, n) independent at all samples."""
+    """Return ascending indices of rows that are independent at all samples.
+
+    Args:
+        values: (samples, rows, n) numeric matrices.
+        count: number of rows to select.
+    """
     left, numbers, found = values, np.arange(values.shape[1]), list[int]()
     for _ in range(count):
         r, c = _pivot(left)
@@ -98,7 +103,12 @@ def independent_rows(values: Array, count: int) -> list[int]:
 
 
 def dialytic(elimination: Elimination, E: SX) -> SX:
-    """Return k equations of one part of joint 3 and their products by x4 or x5, (2 k, size)."""
+    """Return equations of one part of joint 3, and their products by x4 or x5, (2 k, size).
+
+    Args:
+        elimination: elimination of joints 1 and 2.
+        E: (k, n4 n5) equations.
+    """
     g5, raised = elimination.grid[1], elimination.raised
     n4, n5 = len(elimination.fourth), len(elimination.fifth)
     M = SX(2 * E.size1(), elimination.size)
@@ -110,14 +120,14 @@ def dialytic(elimination: Elimination, E: SX) -> SX:
 
 
 def _pivot(values: Array) -> tuple[int, int]:
-    """Return row and column of the entry whose smallest absolute value over samples is largest."""
+    """Return row and column of the entry whose smallest magnitude over the samples is largest."""
     smallest = np.min(np.abs(values), axis=0)
     r, c = np.unravel_index(first_best(smallest.ravel()), smallest.shape)
     return int(r), int(c)
 
 
 def _clear(row: SX, values: Array) -> SX:
-    """Return the row with zeros for the entries that vanish at all samples."""
+    """Return the row (1, n) with zeros for the entries whose values vanish at all samples."""
     cleared = SX(1, row.size2())
     for k in np.nonzero(np.any(np.abs(values) > _ZERO, axis=0))[0]:
         cleared[0, int(k)] = row[0, int(k)]
@@ -125,14 +135,14 @@ def _clear(row: SX, values: Array) -> SX:
 
 
 def _right_side(elimination: Elimination, ways: Sequence[Pose]) -> SX:
-    """Return the side of the loop equation with joints 1 and 2, by their monomials."""
+    """Return the side of the loop equation with joints 1 and 2, (s, n1 n2), by their monomials."""
     u = _pair(ways[5].inverse())[elimination.elements.tolist()]
     once = _carry(elimination, ways[0].inverse(), _moved(elimination.first, u))
     return _carry(elimination, ways[1].inverse(), _moved(elimination.second, once))
 
 
 def _left_side(elimination: Elimination, ways: Sequence[Pose]) -> list[SX]:
-    """Return the side of the loop equation with the joints 3, 4 and 5, by parts of joint 3."""
+    """Return the side of the loop equation with joints 3, 4 and 5, for each part of joint 3."""
     w = _pair(ways[4])[elimination.elements.tolist()]
     once = _carry(elimination, ways[3], _moved(elimination.fifth, w))
     twice = _carry(elimination, ways[2], _moved(elimination.fourth, once))
@@ -140,12 +150,12 @@ def _left_side(elimination: Elimination, ways: Sequence[Pose]) -> list[SX]:
 
 
 def _moved(parts: Array, columns: SX) -> SX:
-    """Return the columns multiplied by each part, side by side."""
+    """Return the products of the columns with each part, side by side."""
     return SX(casadi.horzcat(*(casadi.mtimes(_constant(part), columns) for part in parts)))
 
 
 def _carry(elimination: Elimination, T: Pose, columns: SX) -> SX:
-    """Return columns of w transformed by a symbolic pose T."""
+    """Return the used elements of columns of w after the symbolic transform T."""
     own = elimination.elements.tolist()
     X = SX(SIZE, SIZE)
     for t, slope in zip(casadi.vertsplit(T.p), SLOPES, strict=True):
@@ -273,7 +283,7 @@ def _length(problem: Problem) -> float:
 
 
 def _numbers(problem: Problem, ring: Ring, length: float) -> Array:
-    """Return the transforms (samples, 6, 4, 4) of a loop at the samples."""
+    """Return the transforms (samples, 6, 4, 4) of a loop at the samples, in units of `length`."""
     gaps = (*ring.gaps[1:], ring.gaps[0])
     stacked = problem.at_samples(SX(casadi.vertcat(*(gap.pose.matrix for gap in gaps))))
     ways = np.array(stacked).reshape(len(stacked), 6, 4, 4)
@@ -282,7 +292,7 @@ def _numbers(problem: Problem, ring: Ring, length: float) -> Array:
 
 
 def _characteristic(problem: Problem, loop: _Loop) -> Characteristic:
-    """Return the matrix whose determinant vanishes at the positions of joint 3."""
+    """Return the matrix of a loop whose determinant vanishes at the positions of joint 3."""
     elimination, joint = loop.pencil.elimination, loop.ring.joints[2]
     A = table(elimination, loop.ways)
     columns = len(elimination.first) * len(elimination.second) - 1
@@ -301,13 +311,13 @@ def _characteristic(problem: Problem, loop: _Loop) -> Characteristic:
 
 
 def _spread(parts: Array) -> Array:
-    """Return the matrices at three angles, for each sample."""
+    """Return the matrices of parts (samples, n3, n, n) at three angles for each sample."""
     count = len(_ANGLES)
     return at(np.repeat(parts, count, axis=0), np.tile(np.array(_ANGLES), len(parts)))
 
 
 def _in_joint(parts: list[SX], loop: _Loop) -> tuple[SX, ...]:
-    """Return the parts with 1, cos q, sin q, or with the powers of r in metres."""
+    """Return the parts as factors of 1, cos q, sin q, or of the powers of r in metres."""
     joint = loop.ring.joints[2]
     if joint.is_rotational:
         return parts[0], parts[1], joint.sign * parts[2]

@@ -69,7 +69,11 @@ KEPT_BY_SLIDE = np.array([3, 4, 6, 7, 8, 11])
 
 
 def pair(T: Field) -> Field:
-    """Return w (..., 15) of the origin and the z axis of frames T (..., 4, 4)."""
+    """Return w (..., 15) of the origin and the z axis of frames.
+
+    Args:
+        T: (..., 4, 4) poses.
+    """
     p, z = T[..., :3, 3], T[..., :3, 2]
     pp, pz = np.sum(p * p, axis=-1)[..., None], np.sum(p * z, axis=-1)[..., None]
     bent = pp * z - 2 * pz * p
@@ -77,7 +81,11 @@ def pair(T: Field) -> Field:
 
 
 def rho(T: Array) -> Array:
-    """Return matrices (..., 15, 15) of displacements T (..., 4, 4) that act on w; see `pair`."""
+    """Return the matrices (..., 15, 15) of displacements that act on w; see `pair`.
+
+    Args:
+        T: (..., 4, 4) rigid displacements.
+    """
     X = np.tensordot(T[..., :3, 3], SLOPES, axes=1)
     turned = np.zeros((*T.shape[:-2], SIZE, SIZE), T.dtype)
     turned[..., range(3), range(3)] = 1.0
@@ -88,12 +96,22 @@ def rho(T: Array) -> Array:
 
 
 def motion_parts(prismatic: bool) -> Array:
-    """Return parts (3, 15, 15) of rho of a joint, with 1, cos q, sin q or with 1, r, r^2."""
+    """Return parts (3, 15, 15) of rho of a joint motion.
+
+    They are factors of 1, cos q, sin q for a revolute joint, of 1, r, r^2 for a prismatic joint.
+
+    Args:
+        prismatic: whether the joint is prismatic.
+    """
     return SLIDE if prismatic else TURN
 
 
 def back_parts(prismatic: bool) -> Array:
-    """Return parts (3, 15, 15) of rho of the inverse motion of a joint, as in `motion_parts`."""
+    """Return parts (3, 15, 15) of rho of the inverse motion of a joint, as in `motion_parts`.
+
+    Args:
+        prismatic: whether the joint is prismatic.
+    """
     signs = np.array([1.0, -1.0, 1.0] if prismatic else [1.0, 1.0, -1.0])
     back: Array = signs[:, None, None] * motion_parts(prismatic)
     return back
@@ -103,6 +121,9 @@ def half_parts(prismatic: bool) -> Array:
     """Return parts (3, 15, 15) of rho of a joint with 1, x, x^2: (1 + x^2) rho for a rotation.
 
     The variable x is tan(q/2) for a rotation, and the displacement r for a translation.
+
+    Args:
+        prismatic: whether the joint is prismatic.
     """
     if prismatic:
         return SLIDE
@@ -176,7 +197,11 @@ class Elimination:
         return self._carry(inverse(ways[:, 1]), twice.reshape(*u.shape, -1))[:, 1:]
 
     def left_side(self, ways: Array) -> Array:
-        """Return coefficients (N, n3, s - 1, n4 n5) of x4^i x5^j, for each weight of joint 3."""
+        """Return coefficients (N, n3, s - 1, n4 n5) of x4^i x5^j, for each weight of joint 3.
+
+        Args:
+            ways: (N, 6, 4, 4) constant transforms of the loop.
+        """
         w = pair(ways[:, 4])[:, self.elements]
         once = self._carry(ways[:, 3], np.einsum("jab,nb->naj", self.fifth, w))
         twice = np.einsum("iab,nbj->naij", self.fourth, once)
@@ -185,12 +210,22 @@ class Elimination:
         return left
 
     def equations(self, rows: Array, right: Array, left: Array) -> Array:
-        """Return equations (N, n3, k, n4 n5) in joints 3, 4, 5 from null rows (N, k, s - 1)."""
+        """Return the equations (N, n3, k, n4 n5) in joints 3, 4, 5, without joints 1 and 2.
+
+        Args:
+            rows: (N, k, s - 1) null rows of the factors of joints 1 and 2.
+            right: result of `right_side`.
+            left: result of `left_side`.
+        """
         constant = rows @ right[:, :, :1]
         return rows[:, None] @ left - constant[:, None] * self.one[:, None, :]
 
     def dialytic(self, E: Array) -> Array:
-        """Return the equations and their products by x4 or x5, (N, n3, 2 k, size)."""
+        """Return the equations and their products by x4 or x5, (N, n3, 2 k, size).
+
+        Args:
+            E: (N, n3, k, n4 n5) equations.
+        """
         count = E.shape[2]
         M = np.zeros((*E.shape[:2], 2 * count, *self.grid))
         E = E.reshape(*E.shape[:3], len(self.fourth), len(self.fifth))
@@ -200,15 +235,20 @@ class Elimination:
         return M.reshape(*M.shape[:3], -1)
 
     def _carry(self, T: Array, columns: Array) -> Array:
+        """Return the used elements of columns of w after displacements T (N, 4, 4)."""
         moved: Array = rho(T)[:, self.elements[:, None], self.elements] @ columns
         return moved
 
 
 def weights(u: Array, count: int) -> Array:
-    """Return weights (N, count) of joint 3 at angles u (N,).
+    """Return the weights (N, count) of the parts of joint 3 at its angle.
 
     They are 1, cos u, sin u, or cos(u/2), sin(u/2) for count 2. A revolute joint is at u, a
     prismatic joint at r = tan(u/2).
+
+    Args:
+        u: (N,) angles [rad].
+        count: number of parts, 2 or 3.
     """
     if count == 2:
         return np.stack([np.cos(u / 2), np.sin(u / 2)], axis=-1)
@@ -216,25 +256,39 @@ def weights(u: Array, count: int) -> Array:
 
 
 def at(M: Array, u: Array) -> Array:
-    """Return the matrices at angles u (N,), from their parts (N, n3, n, n)."""
+    """Return the matrices (N, n, n) at angles of joint 3.
+
+    Args:
+        M: (N, n3, n, n) parts of the matrices.
+        u: (N,) angles [rad].
+    """
     value: Array = np.einsum("nk,nkab->nab", weights(u, M.shape[1]), M)
     return value
 
 
 def null_rows(right: Array, rank: int) -> Array:
-    """Return orthonormal rows (N, s - 1 - rank, s - 1) that cancel the monomials of joints 1, 2."""
+    """Return orthonormal rows (N, s - 1 - rank, s - 1) that cancel the monomials of joints 1 and 2.
+
+    Args:
+        right: result of `Elimination.right_side`.
+        rank: rank of its columns after the first.
+    """
     U = np.linalg.svd(right[:, :, 1:])[0]
     return np.swapaxes(U[:, :, rank:], -1, -2)
 
 
 def eliminations(prismatic: Joints) -> list[Elimination]:
-    """Return all eliminations: products by x4 or x5, and fewer equations with prismatic joints."""
+    """Return all eliminations: products by x4 or x5, and fewer equations with prismatic joints.
+
+    Args:
+        prismatic: (6,) whether each joint of the loop is prismatic.
+    """
     chosen = [np.arange(SIZE)] + ([LINEAR] if np.any(prismatic) else [])
     return [_elimination(prismatic, elements, k) for elements in chosen for k in (0, 1)]
 
 
 def _elimination(prismatic: Joints, elements: NDArray[np.int64], raised: int) -> Elimination:
-    """Return the tables of an elimination for the types of the joints."""
+    """Return elimination with these `elements` of w; `raised` is 0 for products by x4, 1 for x5."""
     slides = [bool(joint) for joint in prismatic]
     highest = 3 if len(elements) == SIZE else 2
     counts = [highest if slide else 3 for slide in slides]
@@ -258,7 +312,7 @@ def _elimination(prismatic: Joints, elements: NDArray[np.int64], raised: int) ->
 
 
 def _third(slides: bool, count: int) -> tuple[Array, Array]:
-    """Return the parts of joint 3 for its `weights`, and the coefficients of the number 1."""
+    """Return first `count` parts of joint 3 for its `weights`, and coefficients of the number 1."""
     parts = motion_parts(slides)[:count]
     if not slides:
         return parts, np.array([1.0, 0.0, 0.0])
@@ -299,7 +353,7 @@ def middle_joints(M: Array, grid: tuple[int, int], count: int) -> tuple[Array, A
 
 
 def _shift(low: Array, high: Array) -> Array:
-    """Return the least-squares solutions X (n, m, m) of high = low X."""
+    """Return the least-squares solutions X (N, m, m) of high = low X."""
     count = low.shape[-1]
     low, high = (part.reshape(len(low), -1, count) for part in (low, high))
     # directions with singular values of rounding, about 1e-15, give no shift
@@ -307,7 +361,7 @@ def _shift(low: Array, high: Array) -> Array:
 
 
 def _rayleigh(vectors: Array, X: Array) -> Array:
-    """Return Rayleigh quotients (n, m) of X for vectors in columns; real parts if X is real."""
+    """Return Rayleigh quotients (N, m) of X (N, m, m) for vectors in columns; real if X is real."""
     size = np.sum(np.abs(vectors) ** 2, axis=1)
     values: Array = np.sum(np.conj(vectors) * (X @ vectors), axis=1) / size
     return np.real(values) if np.isrealobj(X) else values
@@ -347,7 +401,11 @@ class Arrangement:
     length: float
 
     def all_ways(self, T: Array) -> Array:
-        """Return the transforms (N, 6, 4, 4) of the loop for target poses T (N, 4, 4) [m]."""
+        """Return the transforms (N, 6, 4, 4) of the loop for target poses.
+
+        Args:
+            T: (N, 4, 4) target poses [m].
+        """
         T = _scale(T, self.length)
         ways = np.broadcast_to(self.ways, (len(T), 6, 4, 4)).copy()
         ways[:, self.index] = ways[:, self.index] @ self._pose(T) @ self.after
@@ -358,7 +416,11 @@ class Arrangement:
         return inverse(T) if self.sign > 0 else T
 
     def configurations(self, u: Array) -> Array:
-        """Return arm configurations (..., 6), angles in [-pi, pi), for loop joints at u."""
+        """Return arm configurations (..., 6) [rad or m], with angles in [-pi, pi).
+
+        Args:
+            u: (..., 6) positions of the joints of the loop.
+        """
         u = self.sign * (u + self.offsets)
         wrapped = (u + np.pi) % (2 * np.pi) - np.pi
         q = np.empty_like(u)
@@ -394,7 +456,11 @@ def arrangements(arm: Arm, offsets: Array) -> list[Arrangement]:
 
 
 def loop_length(arm: Arm) -> float:
-    """Return a typical length of an arm [m] that does not depend on its base and tool."""
+    """Return a typical length of an arm [m] that does not depend on its base and tool.
+
+    Args:
+        arm: arm of six joints.
+    """
     inner = float(np.sum(np.linalg.norm(arm.gaps[1:6, :3, 3], axis=1)))
     return inner if inner > _TINY_LENGTH * arm.length else arm.length
 
@@ -489,7 +555,7 @@ def regularity(M: Array) -> float:
 
 
 def _mix(size: int, rows: int) -> Array:
-    """Return orthonormal rows (size, rows); the identity if size and rows are equal."""
+    """Return orthonormal rows (size, rows), random unless size and rows are equal."""
     if rows == size:
         return np.eye(size)
     columns = np.random.default_rng(_SEED).standard_normal((rows, size))
@@ -575,16 +641,19 @@ def prepare(arm: Arm) -> Prepared:
 
 
 def _eliminated(prepared: Prepared) -> frozenset[int]:
-    """Return the indices of the two arm joints that are eliminated first."""
+    """Return the indices of the two joints of the arm that are eliminated first."""
     return frozenset(prepared.arrangement.order[:2].tolist())
 
 
 def for_poses(prepared: Prepared, T: Array) -> list[tuple[Prepared, Numbers]]:
-    """Return the loops whose matrices are regular at poses, and the indices of these poses.
+    """Return, for each pose, the prepared loop whose matrix is regular there.
 
     Args:
         prepared: arm from `prepare`.
         T: (N, 4, 4) target poses [m].
+
+    Returns:
+        Pairs of a loop and the indices of its poses.
     """
     best, most = np.zeros(len(T), dtype=np.int64), np.full(len(T), -1.0)
     every = (prepared, *prepared.others)
@@ -599,7 +668,7 @@ def for_poses(prepared: Prepared, T: Array) -> list[tuple[Prepared, Numbers]]:
 
 
 def _reached(arm: Arm) -> Array:
-    """Return poses (2, 4, 4) of generic configurations."""
+    """Return poses (2, 4, 4) of generic configurations of an arm [m]."""
     rng = np.random.default_rng(_PREPARE_SEED)
     turns = rng.uniform(-np.pi, np.pi, (_POSES, 6))
     # displacements of the size of the arm and not near zero, where axes might intersect
@@ -617,9 +686,12 @@ _ROUNDING = 1e-16  # lower limit of singular values that divide, relative to the
 
 
 def complex_roots(M: Array) -> NDArray[np.complex128]:
-    """Return complex angles u (N, r) at which the matrices (N, n3, n, n) are singular.
+    """Return complex angles u (N, r) [rad] at which matrices are singular.
 
     Some angles with a large imaginary part belong to no configuration.
+
+    Args:
+        M: (N, n3, n, n) parts of the matrices.
     """
     offset, coefficients = _rotate(M / np.max(np.abs(M), axis=(1, 2, 3), keepdims=True))
     x = np.linalg.eigvals(_companion(coefficients)).astype(complex)
@@ -631,7 +703,10 @@ def complex_roots(M: Array) -> NDArray[np.complex128]:
 
 
 def _companion(coefficients: Array) -> Array:
-    """Return companion matrices (N, d n, d n) of matrix polynomials in x of degree d."""
+    """Return the companion matrices (N, d n, d n) of matrix polynomials of degree d.
+
+    `coefficients` (N, d + 1, n, n) are in ascending order.
+    """
     count, degree, n = len(coefficients), coefficients.shape[1] - 1, coefficients.shape[-1]
     companion = np.zeros((count, degree * n, degree * n))
     companion[:, range((degree - 1) * n), range(n, degree * n)] = 1.0
@@ -643,7 +718,10 @@ def _companion(coefficients: Array) -> Array:
 
 
 def _far_regularities(M: Array) -> Array:
-    """Return reciprocal condition numbers (N, 8) of matrices at x = infinity, for each offset."""
+    """Return reciprocal condition numbers (N, 8) of matrices at x = infinity, for each offset.
+
+    M (N, n3, n, n) are the parts of the matrices.
+    """
     far = np.einsum("ok,nkab->noab", weights(_OFFSETS + np.pi, M.shape[1]), M)
     values = np.linalg.svd(far, compute_uv=False)
     conditions: Array = values[..., -1] / np.maximum(values[..., 0], NONZERO)
@@ -651,7 +729,7 @@ def _far_regularities(M: Array) -> Array:
 
 
 def _regularities(M: Array) -> Array:
-    """Return regularities (N,) of matrices (N, n3, n, n): the best over the offsets."""
+    """Return best reciprocal condition numbers (N,) over the offsets, for parts (N, n3, n, n)."""
     most: Array = np.max(_far_regularities(M), axis=1)
     return most
 

@@ -29,7 +29,14 @@ _DEPTH = 9
 
 
 def quotient(value: SX, divisor: SX) -> SX:
-    """Return the quotient of two scalars with common factors cancelled, such as A for A^2 / A."""
+    """Return the quotient of two scalar expressions with common factors cancelled.
+
+    For example A^2 / A is A.
+
+    Args:
+        value: scalar numerator.
+        divisor: scalar denominator.
+    """
     above, below = _factors(value), _factors(divisor)
     rest: list[SX] = []
     for factor in above:
@@ -43,7 +50,7 @@ def quotient(value: SX, divisor: SX) -> SX:
 
 
 def _factors(value: SX) -> list[SX]:
-    """Return the factors of a product expression."""
+    """Return the factors of a scalar product expression; a list of itself for other expressions."""
     if value.is_op(casadi.OP_MUL):
         return _factors(value.dep(0)) + _factors(value.dep(1))
     if value.is_op(casadi.OP_SQ):
@@ -70,17 +77,17 @@ pivot would amplify rounding errors of 1e-13 to significant coefficients."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grouping:
-    """Expression of every column as a combination of the kept columns.
+    """Expression of every regressor column as a linear combination of the kept columns.
 
     Attributes:
-        columns: for each column of the regressor, the coefficients of the kept columns.
+        columns: for each column of the regressor, the coefficients of the kept columns by index.
     """
 
     columns: tuple[Terms, ...]
 
     @staticmethod
     def none(size: int) -> Grouping:
-        """Return the grouping that keeps all columns."""
+        """Return the grouping of `size` columns in which all columns are kept."""
         return Grouping(tuple({k: SX(1)} for k in range(size)))
 
     @property
@@ -89,7 +96,14 @@ class Grouping:
         return [k for k, terms in enumerate(self.columns) if k in terms]
 
     def reduced(self, terms: Terms) -> dict[int, SX]:
-        """Express a combination of any columns by the kept columns."""
+        """Return a linear combination of any columns as a combination of the kept columns.
+
+        Args:
+            terms: coefficients by column index.
+
+        Returns:
+            Coefficients by index of kept columns. Coefficients that cancel are left out.
+        """
         total: dict[int, SX] = {}
         for column, coefficient in terms.items():
             for k, part in self.columns[column].items():
@@ -97,7 +111,12 @@ class Grouping:
         return total
 
     def replaced(self, dropped: int, terms: Terms) -> Grouping:
-        """Eliminate a kept column that equals a combination of other columns."""
+        """Return the grouping after a kept column is eliminated.
+
+        Args:
+            dropped: index of the kept column.
+            terms: combination of other columns, by index, that equals this column.
+        """
         equal = self.reduced(terms)
         columns = []
         for column in self.columns:
@@ -114,7 +133,7 @@ class Grouping:
 def related(
     grouping: Grouping, relation: Terms, ranks: Callable[[int], int], sampled: Sampled
 ) -> Grouping:
-    """Apply a relation: a combination of columns that vanishes.
+    """Return the grouping after a relation: a combination of columns that vanishes in all states.
 
     The kept column of highest rank is eliminated, among the columns whose coefficient is nonzero at
     every sample. Among equal ranks, it is the column with the largest coefficient, so that
@@ -124,7 +143,7 @@ def related(
         grouping: grouping from earlier relations.
         relation: coefficients of the combination.
         ranks: function from column index to rank; the highest rank is eliminated first.
-        sampled: function that evaluates coefficients, to decide whether they vanish.
+        sampled: function that evaluates coefficients at samples, to decide whether they vanish.
     """
     rest = grouping.reduced(relation)
     if not rest:
@@ -143,7 +162,12 @@ def related(
 
 
 def without_zeros(grouping: Grouping, sampled: Sampled) -> Grouping:
-    """Remove coefficients whose symbolic terms cancel numerically."""
+    """Return the grouping without coefficients whose symbolic terms cancel numerically.
+
+    Args:
+        grouping: grouping with symbolic coefficients.
+        sampled: function that evaluates expressions at samples of the system parameters.
+    """
     columns = []
     for terms in grouping.columns:
         written = {k: x for k, x in terms.items() if not x.is_constant()}
@@ -154,14 +178,20 @@ def without_zeros(grouping: Grouping, sampled: Sampled) -> Grouping:
 
 
 def coefficients(grouping: Grouping) -> Iterable[tuple[int, int, SX]]:
-    """Yield (kept column, column, coefficient of the column's parameter in the base parameter)."""
+    """Yield the nonzero coefficients of the base parameters: (kept column, column, coefficient).
+
+    The base parameter of a kept column is the sum of coefficient times parameter over columns.
+
+    Args:
+        grouping: grouping of the columns.
+    """
     for number, terms in enumerate(grouping.columns):
         for k, coefficient in terms.items():
             yield k, number, coefficient
 
 
 def _add(total: dict[int, SX], k: int, part: SX) -> None:
-    """Add to one coefficient, and remove it if the sum is zero up to rounding."""
+    """Add `part` to the coefficient total[k] in place; delete it if the sum is zero."""
     if part.is_zero():
         return
     if k not in total:
@@ -197,13 +227,13 @@ def equation(name: str, terms: Mapping[str, SX]) -> str:
 
 
 def _sign(coefficient: SX) -> tuple[str, str]:
-    """Return the sign ("+" or "-") of a coefficient and its magnitude as the text of a factor."""
+    """Return the sign ("+" or "-") of a coefficient and the text of its magnitude."""
     negative, size = _split(coefficient)
     return "-" if negative else "+", _factor(size)
 
 
 def _split(value: SX) -> tuple[bool, SX]:
-    """Return whether a factor is written with a negative sign, and the factor without it."""
+    """Return whether a coefficient is written with a minus sign, and the coefficient without it."""
     if value.is_constant():
         return float(value) < 0, SX(abs(float(value)))
     if value.is_op(casadi.OP_NEG):
@@ -230,7 +260,11 @@ def _factor(value: SX) -> str:
 
 
 def table(rows: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """Yield lines of two columns; the first is as wide as its longest entry."""
+    """Yield the lines of a text table of two columns, of which the first is padded to equal width.
+
+    Args:
+        rows: pairs (left, right) of texts.
+    """
     width = max((len(left) for left, _ in rows), default=0)
     yield from (f"{left:<{width}}  {right}".rstrip() for left, right in rows)
 
@@ -275,7 +309,13 @@ _TRIES = 40
 
 
 def default_parameters(system: System) -> Array:
-    """Return default values (np,) of the parameters, or random values if they have none."""
+    """Return the default values (np,) of the parameters of a system.
+
+    Parameters without default value have random values between 0.4 and 1.
+
+    Args:
+        system: open or closed.
+    """
     # between 0.4 and 1: typical lengths and masses of a robot, none near zero
     free = 0.4 + 0.6 * np.random.default_rng(_SEED).random(len(system.parameters))
     defaults = np.array(system.p_default, dtype=float)
@@ -283,7 +323,7 @@ def default_parameters(system: System) -> Array:
 
 
 def parameter_samples(system: System, value: SX) -> list[Array]:
-    """Return samples of the parameters: the default values, then up to three samples near them.
+    """Return samples (np,) of the parameters: default values, then up to three samples near them.
 
     Only the default values are returned if the expression does not depend on symbols.
 
@@ -309,7 +349,13 @@ def parameter_samples(system: System, value: SX) -> list[Array]:
 
 
 def sampler(system: System) -> Sampled:
-    """Return a function that evaluates scalars at samples of the system parameters."""
+    """Return a function from n scalar expressions to their values (samples, n).
+
+    The samples are those of `parameter_samples`; constant expressions have one sample.
+
+    Args:
+        system: system of the parameters.
+    """
 
     def sampled(values: list[SX]) -> Array:
         column = casadi.vertcat(*values)

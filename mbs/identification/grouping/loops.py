@@ -62,7 +62,14 @@ _SYMMETRIC = (("XX", "YY"), ("MZ",), ("M",))
 
 
 def cut_relations(system: System) -> Iterator[Relation]:
-    """Yield relations from bodies that may be attributed to either side of a cut joint."""
+    """Yield relations from bodies that may be attributed to either side of a cut joint.
+
+    A relation maps parameters (link index, kind) to their coefficients in a combination without
+    effect.
+
+    Args:
+        system: system with closed loops.
+    """
     for cut in system.cuts:
         axis, shared = _share(cut)
         sides = [(cut.link_a, cut.pose_a, 1), (cut.link_b, cut.pose_b, -1)]
@@ -78,7 +85,11 @@ def cut_relations(system: System) -> Iterator[Relation]:
 
 
 def _share(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
-    """Return the frame of such a body, and combinations with equal effect on both sides."""
+    """Return the frame of a body that may be attributed to either side of a cut joint.
+
+    The second result lists tuples of kinds of inertial parameters that change together with equal
+    effect on both sides.
+    """
     joint = cut.edge.joint
     freedoms = joint.freedoms
     if cut.welded or isinstance(joint, Fixed):
@@ -98,7 +109,7 @@ def _share(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
 
 
 def _along(freedom: Freedom) -> Pose:
-    """Return the rotation that aligns the z axis with the axis of a freedom."""
+    """Return the pose that rotates the z axis onto the axis of a joint freedom."""
     return Pose.rotation(align_z(freedom.axis))
 
 
@@ -125,18 +136,24 @@ def pair_relations(
 
 
 def _rotation(R: Array) -> SX:
-    """Return a constant rotation from closed configurations, whose loop errors are about 1e-13."""
+    """Return a constant rotation (3, 3) of closed configurations, with rounding errors removed."""
     noise = 1e-12  # ten times the loop error: smaller elements are zeros
     return SX(DM(nearest_rotation(R.tolist(), noise=noise)))
 
 
 def _side_by_side(poses: Sequence[tuple[Array, Array]], a: int, b: int) -> bool:
-    """Whether the vector between two origins is constant, so that they have the same velocity."""
+    """Whether the vector between origins a and b is constant, so that they have the same velocity.
+
+    `poses` are pairs of orientations and origins as returned by `_link_poses`.
+    """
     return all(_constant(origins[b] - origins[a]) for _, origins in poses)
 
 
 def _shared_by_pair(a: int, b: int, R: SX, moments: bool) -> Iterator[Relation]:
-    """Yield the relations that shift parameters of link b to link a, or drop them at the base."""
+    """Yield relations that shift parameters of link b to link a, or drop them for the base (-1).
+
+    R is the constant orientation of b relative to a; `moments` includes first moments and mass.
+    """
     through = lambda_transform(Pose.rotation(R))
     names = TEN_PARAMETERS[: (9 if a < 0 else 10) if moments else 6]
     for k, name in enumerate(names):
@@ -144,7 +161,10 @@ def _shared_by_pair(a: int, b: int, R: SX, moments: bool) -> Iterator[Relation]:
 
 
 def _link_poses(system: System, configurations: ClosedConfigurations) -> tuple[Array, Array]:
-    """Return orientations (1 + links, n, 3, 3) and origins (1 + links, n, 3) of base and links."""
+    """Return orientations (1 + links, n, 3, 3) and origins (1 + links, n, 3) of base and links.
+
+    n is the number of configurations.
+    """
     q = SX.sym("q", system.nq)
     poses = [Pose.identity(), *base_poses(system.tree, link_poses(system.tree, q))]
     at = Function("poses", [q, system.p], [casadi.horzcat(*(pose.matrix for pose in poses))])
@@ -154,7 +174,7 @@ def _link_poses(system: System, configurations: ClosedConfigurations) -> tuple[A
 
 
 def _constant(values: Array) -> bool:
-    """Whether values are equal in all configurations (first axis)."""
+    """Whether values (n, ...) are equal in all n configurations."""
     return bool(np.max(np.abs(values - values[0])) < _SAME)
 
 
@@ -212,7 +232,11 @@ def turning_relations(
 
 
 def configurations_needed(system: System) -> int:
-    """Return a number of configurations that avoids accidental dependence of velocity products."""
+    """Return a number of configurations that avoids accidental dependence of velocity products.
+
+    Args:
+        system: system with closed loops.
+    """
     effects = 6 * len(system.tree.links) + system.nv
     m = max(len(system.active), 1)
     return max(12, -(-3 * effects // (m * (m + 1))))
@@ -238,7 +262,10 @@ def _angular(system: System, configurations: Sequence[ClosedConfigurations], G: 
 
 
 def _one_direction(rows: Array) -> Array | None:
-    """Return the constant direction (3,) of an angular velocity (configurations, 3, m), or None."""
+    """Return the constant direction (3,) of an angular velocity (configurations, 3, m), or None.
+
+    None also if the angular velocity is always zero.
+    """
     columns = rows.transpose(1, 0, 2).reshape(3, -1)
     U, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     if sizes[0] < _SAME or sizes[1] > _SAME * sizes[0]:
@@ -250,19 +277,25 @@ def _one_direction(rows: Array) -> Array | None:
 
 
 def _rotational(j: int, rows: Array) -> Iterator[Effect]:
-    """Yield the energy effects of the inertia tensor of link j, from its angular velocity."""
+    """Yield the effects of the inertia tensor of link j on its kinetic energy.
+
+    `rows` (configurations, 3, m) is its angular velocity per independent velocity.
+    """
     for name, (k, i) in zip(TEN_PARAMETERS, zip(*np.triu_indices(3), strict=True), strict=False):
         yield Effect((j, name), (1 if k == i else 2) * _product(rows[:, k], rows[:, i]))
 
 
 def _product(first: Array, second: Array) -> Array:
-    """Return the products of two velocities (configurations, m) as quadratic forms, flattened."""
+    """Return the products of two velocities (configurations, m) as flattened quadratic forms.
+
+    The elements are coefficients of products of independent velocities.
+    """
     k, i = np.triu_indices(first.shape[1])
     return np.ravel(first[:, k] * second[:, i] + first[:, i] * second[:, k])
 
 
 def _dependent(effects: Sequence[Effect]) -> Iterator[Relation]:
-    """Yield relations between parameters with dependent effects."""
+    """Yield relations between the parameters whose effects are linearly dependent."""
     if not effects:
         return
     found = dependence(np.column_stack([e.column for e in effects]), range(len(effects)))
@@ -277,7 +310,10 @@ def _dependent(effects: Sequence[Effect]) -> Iterator[Relation]:
 
 
 def _dry_friction(links: Sequence[Link], joints: dict[int, Array]) -> Iterator[Relation]:
-    """Yield relations of Coulomb friction of joints at rest or with a constant velocity ratio."""
+    """Yield relations of Coulomb friction of joints at rest or with a constant velocity ratio.
+
+    `joints` maps link indices to joint velocities (configurations, m) per independent velocity.
+    """
     for k, rows in joints.items():
         if np.max(np.abs(rows)) < _SAME:
             yield {(k, "Fs"): SX(1)}

@@ -89,12 +89,17 @@ class Adjustable:
 
 
 def adjustables(system: System) -> list[Adjustable]:
-    """Return all numbers that may become symbols: links in order, cut joints, gravity."""
+    """Return all numbers of a system that may become symbols: links in order, cut joints, gravity.
+
+    Args:
+        system: open or closed system.
+    """
     rows = [row for j, link in enumerate(system.tree.links) for row in _of_link(j, link)]
     return [*rows, *_of_cuts(system), *_of_gravity(system)]
 
 
 def _of_link(j: int, link: Link) -> Iterator[Adjustable]:
+    """Yield the numbers of link j (index from 0) and of the fixed frames on the path to it."""
     for k, frame in enumerate(link.via):
         label = f"{j + 1}_{k + 1}"
         for kind, value in zip(PLACEMENT, frame.parameters, strict=True):
@@ -115,6 +120,7 @@ def _of_link(j: int, link: Link) -> Iterator[Adjustable]:
 
 
 def _of_cuts(system: System) -> Iterator[Adjustable]:
+    """Yield the positions of the frames of cut joints, which may become symbols."""
     for cut in system.cuts:
         joint = cut.edge.joint.name
         for side, (_, pose) in zip("ab", cut.frames, strict=True):
@@ -125,6 +131,7 @@ def _of_cuts(system: System) -> Iterator[Adjustable]:
 
 
 def _of_gravity(system: System) -> Iterator[Adjustable]:
+    """Yield the three components of gravity, which may become symbols."""
     for row, axis in enumerate("xyz"):
         text = f"{axis} of the gravity acceleration in the base frame"
         value = system.tree.gravity[row]
@@ -179,6 +186,7 @@ def symbolic(system: System, what: Sequence[str]) -> System:
 
 
 def _names(system: System, what: Sequence[str]) -> list[str]:
+    """Return the requested names as a list. Raise ModelError for another type or repeated names."""
     if not isinstance(what, (str, list, tuple)):
         raise ModelError(
             f"{system.name}: what is to be symbols is {quoted(what)}; give names such as"
@@ -211,15 +219,20 @@ def _choose(system: System, names: Sequence[str]) -> list[Adjustable]:
 
 
 def _is_number(row: Adjustable) -> bool:
+    """Whether the value of an adjustable is a number and not an expression."""
     return bool(row.value.is_constant())
 
 
 def _is_itself(row: Adjustable, parameters: set[str]) -> bool:
-    """Return whether the value is already the symbol of that name."""
+    """Whether the value is already the symbol with the name of the adjustable.
+
+    `parameters` are the names of the parameters of the system.
+    """
     return row.name in parameters and row.value.is_symbolic() and row.value.name() == row.name
 
 
 def _check_number(system: System, row: Adjustable) -> None:
+    """Raise ModelError if the value is an expression of other symbols."""
     own = {parameter.name for parameter in system.parameters}
     if not _is_number(row) and not _is_itself(row, own):
         names = ", ".join(dict.fromkeys(s.name() for s in casadi.symvar(row.value)))
@@ -229,7 +242,10 @@ def _check_number(system: System, row: Adjustable) -> None:
 
 
 def _of_body(system: System, rows: Sequence[Adjustable], name: str) -> list[Adjustable]:
-    """Return the ten inertial parameters of the link of a body that are no symbols."""
+    """Return the ten inertial parameters of the link of the body `name` that are not symbols yet.
+
+    Raises ModelError if there is no such body, or if its link has further bodies with mass.
+    """
     links = {body.name: body.link for body in system.bodies}
     if name not in links:
         known = [*GROUPS, *links, *(row.name for row in rows)]
@@ -248,7 +264,7 @@ def _of_body(system: System, rows: Sequence[Adjustable], name: str) -> list[Adju
 
 
 def _check_welds(system: System, rows: Sequence[Adjustable]) -> None:
-    """Raise if Fixed joints carry all bodies of a link with inertial symbols."""
+    """Raise ModelError if each body of a link with inertial symbols is carried by a Fixed joint."""
     for number in sorted({int(r.owner[1]) for r in rows if r.kind in TEN_PARAMETERS}):
         carriers = [j for j in system.joints if j.part is not None and j.frame_b[0] == number]
         bodies = [body.name for body in system.bodies if body.link == number + 1]
@@ -267,7 +283,7 @@ def _with(
     symbols: _Symbols,
     parameters: Sequence[Parameter],
 ) -> System:
-    """Return the system with symbols instead of the numbers."""
+    """Return the system with `symbols` instead of the numbers `rows`, and further `parameters`."""
     given: dict[tuple[str, int | str], dict[str, SX]] = {}
     for row in rows:
         given.setdefault(row.owner, {})[row.kind] = symbols[row.name]
@@ -295,6 +311,7 @@ def _with(
 
 
 def _link(j: int, link: Link, given: _Given) -> Link:
+    """Return link j (index from 0) with the symbols in `given` instead of its numbers."""
     via = tuple(
         _frame(frame, given.get(("fixed frame", f"{j + 1}_{k}"), {}))
         for k, frame in enumerate(link.via, 1)
@@ -311,17 +328,20 @@ def _link(j: int, link: Link, given: _Given) -> Link:
 
 
 def _frame(frame: Khalil, values: _Symbols) -> Khalil:
+    """Return the Khalil frame with the symbols in `values` (by kind) instead of its numbers."""
     six = zip(PLACEMENT, frame.parameters, strict=True)
     return Khalil(*(values.get(kind, old) for kind, old in six)) if values else frame
 
 
 def _with_position(pose: Pose, values: _Symbols) -> Pose:
+    """Return the pose with the symbols in `values` (keys x, y, z) instead of its position."""
     if not values:
         return pose
     return pose.at(casadi.vertcat(*(values.get(k, pose.p[i]) for i, k in enumerate("xyz"))))
 
 
 def _sensor(sensor: AttachedSensor, joints: Sequence[JointRow]) -> AttachedSensor:
+    """Return a sensor on a joint with the changed frames of this joint."""
     if sensor.joint is None:
         return sensor
     joint = joints[sensor.joint]
@@ -329,6 +349,7 @@ def _sensor(sensor: AttachedSensor, joints: Sequence[JointRow]) -> AttachedSenso
 
 
 def _cut(cut: Cut, given: _Given) -> Cut:
+    """Return the cut joint with the symbols in `given` instead of the positions of its frames."""
     name = cut.edge.joint.name
     return replace(
         cut,
@@ -338,7 +359,10 @@ def _cut(cut: Cut, given: _Given) -> Cut:
 
 
 def _joint(row: JointRow, cuts: Sequence[Cut], given: _Given) -> JointRow:
-    """Return the row of a joint, with its frames at the changed positions of the cut joint."""
+    """Return the row of a joint with its frames at the changed positions of its cut joint.
+
+    The row is unchanged if it has no cut joint with symbols.
+    """
     moves = [m for cut in cuts if cut.edge.joint.name == row.name for m in _moves(cut, given)]
     if not moves:
         return row
@@ -358,5 +382,6 @@ def _moves(cut: Cut, given: _Given) -> Iterator[tuple[Frame, Frame]]:
 
 
 def _is_same(one: Frame, other: Frame) -> bool:
+    """Whether two frames are on the same link and have equal poses."""
     same = casadi.is_equal(one[1].matrix, other[1].matrix, 3)
     return one[0] == other[0] and bool(same)

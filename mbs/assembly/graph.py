@@ -112,7 +112,7 @@ def connection_graph(
 
 
 def _check_transmissions(mechanism: Description) -> None:
-    """Raise if a gear, rack or screw couples coordinates of the wrong kinds."""
+    """Raise AssemblyError if a gear, rack or screw couples coordinates of the wrong kinds."""
     motions = {
         freedom.coordinate_of(joint.name): freedom.motion
         for joint in mechanism.joints()
@@ -132,7 +132,13 @@ def _check_transmissions(mechanism: Description) -> None:
 
 
 def inertia_of(node: BodyNode, mechanism: Description, symbols: Mapping[str, SX]) -> Inertia:
-    """Return the inertia of all bodies of a node about the origin of its frame."""
+    """Return the inertia of all bodies of a node about the origin of its frame, in its axes.
+
+    Args:
+        node: rigid body of the graph.
+        mechanism: components of the bodies.
+        symbols: CasADi symbol of every parameter.
+    """
     total = Inertia.zero()
     for (name, _), pose in node.members.items():
         component = mechanism.components[name]
@@ -142,11 +148,17 @@ def inertia_of(node: BodyNode, mechanism: Description, symbols: Mapping[str, SX]
 
 
 def is_weld(mechanism: Description, joint: Joint) -> bool:
-    """Return whether a joint welds its two bodies into one rigid body."""
+    """Whether a joint welds its two bodies into one rigid body: a Fixed joint that is not cut.
+
+    Args:
+        mechanism: mechanism with the joint.
+        joint: any joint.
+    """
     return isinstance(joint, Fixed) and joint.name not in mechanism.cuts
 
 
 def _ports(mechanism: Description) -> Iterator[Port]:
+    """Yield the ports of the world, of all bodies and of both sides of all joints."""
     yield mechanism.world.name, ""
     yield from ((body.name, "") for body in mechanism.bodies())
     for joint in mechanism.joints():
@@ -179,6 +191,7 @@ def _welds(
 def _require_connected(
     mechanism: Description, welds: Mapping[Port, list[tuple[Port, Pose]]]
 ) -> None:
+    """Raise AssemblyError if a body or a joint frame has no connection."""
     for (name, side), neighbours in welds.items():
         if not neighbours and name != mechanism.world.name:
             component: Component = mechanism.components[name]
@@ -194,7 +207,10 @@ def _grow(
     welds: Mapping[Port, list[tuple[Port, Pose]]],
     at: _Evaluator,
 ) -> dict[Port, Pose]:
-    """Return every port welded to `start`, with its pose relative to `start`."""
+    """Return every port that is welded to `start`, with its pose relative to `start`.
+
+    Raises AssemblyError if two paths of welds give different poses.
+    """
     members = {start: Pose.identity()}
     queue = deque([start])
     while queue:
@@ -210,7 +226,7 @@ def _grow(
 
 
 class _Evaluator:
-    """Callable that evaluates expressions at values of the parameters."""
+    """Callable from an expression to its numeric value at fixed values of the parameters."""
 
     def __init__(self, symbols: Mapping[str, SX], values: Mapping[str, float]) -> None:
         self.p = casadi.vertcat(*symbols.values()) if symbols else SX(0, 1)
@@ -223,10 +239,12 @@ class _Evaluator:
 
 
 def _evaluator(symbols: Mapping[str, SX], values: Mapping[str, float]) -> _Evaluator:
+    """Return a callable that evaluates expressions at values of the parameters."""
     return _Evaluator(symbols, values)
 
 
 def _require_same_place(port: Port, first: Pose, second: Pose, at: _Evaluator) -> None:
+    """Raise AssemblyError if two paths of welds give different poses of a port."""
     difference = at(first.matrix - second.matrix)
     gap = float(np.linalg.norm(difference[:3, 3]))
     chord = float(np.linalg.norm(difference[:3, :3])) / (2 * np.sqrt(2))
@@ -245,6 +263,10 @@ def _edge(
     home: Mapping[Port, int],
     symbols: Mapping[str, SX],
 ) -> JointEdge:
+    """Return the edge of a joint between two nodes.
+
+    `home` maps ports to node indices. Raises AssemblyError if both sides are on one node.
+    """
     a, b = home[joint.name, "a"], home[joint.name, "b"]
     if a == b:
         raise AssemblyError(
@@ -377,6 +399,10 @@ def _describe_unreached(name: str, graph: BodyGraph, number: int) -> str:
 
 
 def _prim(graph: BodyGraph, need: set[str], keep: set[str], cut: set[str]) -> list[JointEdge]:
+    """Return the joints of a spanning tree by Prim's algorithm; see `spanning_tree`.
+
+    `need`, `keep` and `cut` are names of joints.
+    """
     depth = {0: 0}
     chosen: list[JointEdge] = []
     queue: list[tuple[tuple[bool, int, int, int, int], int]] = []
@@ -405,6 +431,7 @@ def _prim(graph: BodyGraph, need: set[str], keep: set[str], cut: set[str]) -> li
 
 
 def _depth_first(graph: BodyGraph, chosen: list[JointEdge]) -> list[Branch]:
+    """Return the joints of a tree as branches in depth-first order from the world."""
     branches: list[Branch] = []
     rank = {id(edge): number for number, edge in enumerate(graph.edges)}
     ordered = sorted(chosen, key=lambda edge: rank[id(edge)])
@@ -422,6 +449,7 @@ def _depth_first(graph: BodyGraph, chosen: list[JointEdge]) -> list[Branch]:
 
 
 def _branches_from(node: int, edges: list[JointEdge]) -> list[Branch]:
+    """Return the joints at a node as branches that start at it."""
     return [
         Branch(edge, node, edge.b if edge.a == node else edge.a, edge.a == node)
         for edge in edges

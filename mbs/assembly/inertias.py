@@ -19,9 +19,10 @@ _PARALLEL = 1e-9
 
 
 def inertia_notes(tree: Tree, bodies: Iterable[tuple[RigidBody, int]]) -> list[ImportNote]:
-    """Return notes on impossible inertias of bodies.
+    """Return notes on bodies whose inertia no mass distribution has, such as Ixx > Iyy + Izz.
 
-    The motion of a body with a single rotation axis depends only on the moment of inertia about it.
+    The motion of a body with a single rotation axis depends only on the moment of inertia about it,
+    so that such an inertia is only noted.
 
     Args:
         tree: tree of the mechanism.

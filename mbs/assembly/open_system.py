@@ -136,6 +136,7 @@ def _trial_values(parameters: Sequence[Parameter]) -> dict[str, float]:
 
 
 def _check_names(mechanism: Description, coordinates: Sequence[Coordinate]) -> None:
+    """Raise AssemblyError if two coordinates have the same name."""
     names = [coordinate.name for coordinate in coordinates]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -145,7 +146,7 @@ def _check_names(mechanism: Description, coordinates: Sequence[Coordinate]) -> N
 
 
 def _owners(mechanism: Description, coordinates: Collection[str]) -> set[str]:
-    """Return the names of the joints of these coordinates."""
+    """Return the names of the joints to which coordinates with these names belong."""
     return {
         joint.name
         for joint in mechanism.joints()
@@ -155,6 +156,7 @@ def _owners(mechanism: Description, coordinates: Collection[str]) -> set[str]:
 
 
 def _is_actuated(joint: Joint, in_loops: set[str]) -> bool:
+    """Whether a joint has a motor; by default not in loops (`in_loops`) and not if it is free."""
     if joint.actuated is None:
         return joint.name not in in_loops and not isinstance(joint, Free)
     return joint.actuated
@@ -168,11 +170,12 @@ def _loop_joints(framed: KhalilTree, cut: Cut) -> list[str]:
 
 
 def _looped_joints(framed: KhalilTree) -> set[str]:
+    """Return the names of all joints in loops."""
     return {name for cut in framed.cuts for name in _loop_joints(framed, cut)}
 
 
 def _driven_joints(mechanism: Description) -> set[str]:
-    """Return the names of the driven joints of couplings."""
+    """Return the names of the joints whose coordinate is the driven one of a coupling."""
     driven = [coupling.driven for coupling in mechanism.couplings()]
     return _owners(mechanism, driven)
 
@@ -180,6 +183,7 @@ def _driven_joints(mechanism: Description) -> set[str]:
 def _loop_rows(
     mechanism: Description, framed: KhalilTree, parts: Sequence[ComponentInstance]
 ) -> tuple[LoopRow, ...]:
+    """Return the rows of the table of loops: cut joints, couplings and binding components."""
     loops = [
         LoopRow(
             name=cut.edge.joint.name,
@@ -206,6 +210,7 @@ def _bound_joints(framed: KhalilTree, part: ComponentInstance) -> tuple[str, ...
 
 
 def _cut_coordinates(cuts: Sequence[Cut]) -> tuple[Coordinate, ...]:
+    """Return the coordinates of the cut joints that are not elements of q."""
     rows: list[Coordinate] = []
     for cut in cuts:
         joint = cut.edge.joint
@@ -237,6 +242,7 @@ def _bodies(mechanism: Description, graph: BodyGraph, framed: KhalilTree) -> tup
 
 
 def _mass(body: Component, values: Mapping[str, float]) -> float | None:
+    """Return mass of a body at parameter values [kg]; None if it has no value, 0 without mass."""
     for attribute in ("solid_mass", "mass", "M"):
         scalar = getattr(body, attribute, None)
         if scalar is not None:
@@ -245,6 +251,7 @@ def _mass(body: Component, values: Mapping[str, float]) -> float | None:
 
 
 def _places(graph: BodyGraph, framed: KhalilTree) -> Places:
+    """Return link and pose of every body and joint frame, by component and port."""
     return {
         port: (link, pose @ inside)
         for node, (link, pose) in zip(graph.nodes, framed.homes, strict=True)
@@ -281,6 +288,7 @@ def _frames(
 def _shapes(
     mechanism: Description, places: Places, symbols: Mapping[str, SX]
 ) -> tuple[ShapeRow, ...]:
+    """Return the shapes with the links that carry them, for pictures."""
     rows = []
     for point, shape in mechanism.shapes:
         link, pose = places[point.owner.name, point.port]
@@ -291,7 +299,10 @@ def _shapes(
 def _number(
     mechanism: Description, frames: Mapping[str, tuple[int, Pose]], links: int
 ) -> dict[int, str]:
-    """Return the bodies of the numbered frames of a table; empty if the numbers are the links'."""
+    """Return the body of each frame number of the table from which the mechanism was made.
+
+    Empty if the numbers are those of the `links`.
+    """
     same = len(mechanism.numbered) == links and all(
         frames[name][0] == number - 1 and frames[name][1].is_identity()
         for number, name in mechanism.numbered.items()
@@ -302,6 +313,10 @@ def _number(
 def _couplings(
     mechanism: Description, coordinates: Sequence[Coordinate], symbols: Mapping[str, SX]
 ) -> tuple[CoordinateCoupling, ...]:
+    """Return the relations between coordinates by their indices in q.
+
+    Raises AssemblyError if a coordinate is not in the tree.
+    """
     numbers = {coordinate.name: number for number, coordinate in enumerate(coordinates)}
     result = []
     for coupling in mechanism.couplings():

@@ -45,6 +45,9 @@ def content_of(state: Any) -> Packed | None:
 
     The result is None if the object contains a class or a function of a user: a pickle contains
     only its name, and its code may change. The result is also None if there is no pickle.
+
+    Args:
+        state: object that may contain any number of SX.
     """
     try:
         found, names_alone = _pack(state)
@@ -54,7 +57,7 @@ def content_of(state: Any) -> Packed | None:
 
 
 def _pack(state: Any) -> tuple[Packed, bool]:
-    """Return the pickle of an object and whether it names code of a user."""
+    """Return the pickle of an object, and whether it refers to code of a user by name."""
     buffer = io.BytesIO()
     pickler = _Pickler(buffer)
     pickler.dump(state)
@@ -71,6 +74,8 @@ _KNOWN = frozenset({"mbs", "casadi", "numpy", *sys.stdlib_module_names})
 
 
 class _Pickler(pickle.Pickler):
+    """Pickler that stores all SX in `graphs` and notes code of users in `names_alone`."""
+
     def __init__(self, buffer: io.BytesIO) -> None:
         super().__init__(buffer, protocol=pickle.HIGHEST_PROTOCOL)
         self.graphs: list[SX] = []
@@ -92,6 +97,8 @@ class _Pickler(pickle.Pickler):
 
 
 class _Unpickler(pickle.Unpickler):
+    """Unpickler of a pickle by `_Pickler`, with its SX in `graphs`."""
+
     def __init__(self, buffer: io.BytesIO, graphs: list[SX]) -> None:
         super().__init__(buffer)
         self._graphs = graphs

@@ -170,7 +170,11 @@ class SystemData:
 
     @property
     def free(self) -> tuple[int, ...]:
-        """Indices of velocities whose positions are free: `active`, or those of rolling discs."""
+        """Indices of the velocities whose positions may be chosen independently.
+
+        They equal `active`, unless discs roll without slip: then more positions than velocities are
+        independent.
+        """
         return self.closure.free if self.closure else tuple(range(self.nv))
 
     @property

@@ -271,7 +271,7 @@ def _align(freedom: Freedom, forward: bool) -> Pose:
 def _rotor(
     edge: JointEdge, place: Callable[[int], tuple[int, Pose]], symbols: Mapping[str, SX]
 ) -> CarriedRotor | None:
-    """Return rotor of a joint, on the link that carries the joint's frame_a; None without rotor.
+    """Return the rotor of a joint, on the link of the joint's frame_a; None without rotor.
 
     `place` maps a node index to link and pose.
     """

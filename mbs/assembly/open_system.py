@@ -242,7 +242,7 @@ def _bodies(mechanism: Description, graph: BodyGraph, framed: KhalilTree) -> tup
 
 
 def _mass(body: Component, values: Mapping[str, float]) -> float | None:
-    """Return mass of a body at parameter values [kg]; None if it has no value, 0 without mass."""
+    """Return the mass [kg] of a body at parameter values; None without a value, 0 without mass."""
     for attribute in ("solid_mass", "mass", "M"):
         scalar = getattr(body, attribute, None)
         if scalar is not None:

@@ -140,7 +140,7 @@ class ComponentInstance:
         return self.element.binds and not others
 
     def _unit(self, name: str) -> str:
-        """Return unit of a declared quantity; an effort has the unit of the joint it acts on."""
+        """Return the unit of a declared quantity; an effort has the unit of its joint."""
         unit = self.element.declared[name].unit
         return EFFORT_UNIT[self.levers[0].unit] if unit == EFFORT else unit
 

@@ -192,7 +192,7 @@ def _number(value: Expression, known: Mapping[str, Array]) -> Any:
 
 
 def _motion(name: str, freedoms: Sequence[Freedom], q: Mapping[str, Array]) -> Array:
-    """Return pose of frame_b of the joint `name` in its frame_a, at positions q by coordinate."""
+    """Return the pose of frame_b of joint `name` in its frame_a, at positions q by coordinate."""
     T: Array = np.eye(4)
     for freedom in freedoms:
         T = T @ _elementary_motion(freedom, q[freedom.coordinate_of(name)])
@@ -200,7 +200,7 @@ def _motion(name: str, freedoms: Sequence[Freedom], q: Mapping[str, Array]) -> A
 
 
 def _motion_back(name: str, freedoms: Sequence[Freedom], q: Mapping[str, Array]) -> Array:
-    """Return pose of frame_a of the joint `name` in its frame_b, at positions q by coordinate."""
+    """Return the pose of frame_a of joint `name` in its frame_b, at positions q by coordinate."""
     return _inverse(_motion(name, freedoms, q))
 
 
@@ -294,7 +294,7 @@ def _assembled(
 
 
 def _at_samples(values: Sequence[SX], symbols: Mapping[str, SX], rows: Array) -> Array:
-    """Return matrix expressions at every sample, (values, samples, rows, columns).
+    """Return the matrix expressions at every sample, (values, samples, rows, columns).
 
     `rows` (samples, symbols) are values of the symbols. All expressions have the same shape.
     """

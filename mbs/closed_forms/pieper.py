@@ -211,7 +211,7 @@ def _square_angle(X: SX, Y: SX, Z: SX, sign: SX, G: SX) -> Root:
 
 
 def _outer(scene: PieperLoop, k: int, start: SX, end: SX) -> SequenceStep:
-    """Return step of joint k, which rotates the plane vector `start` (2, 1) onto `end` (2, 1)."""
+    """Return the step of joint k, which rotates the vector `start` (2, 1) onto `end` (2, 1)."""
     return angle_step(scene, k, (start, end), 1.0)
 
 

@@ -697,7 +697,7 @@ class _Triad:
 
     @staticmethod
     def of(loops: PlanarLoops, hidden: int) -> _Triad | None:
-        """Return triad with a hidden direction; None if two of the three columns are parallel."""
+        """Return the triad with a hidden direction; None if two columns are parallel."""
         others = [k for k in range(loops.counts[0]) if k != hidden]
         columns = np.concatenate([loops.angles[:, others], loops.slides], axis=1)
         alpha = np.linalg.svd(columns)[2][-1].conj()

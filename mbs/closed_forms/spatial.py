@@ -575,7 +575,7 @@ def spin(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def _rod_branches(ring: Ring, joint: ChainJoint, q: SX) -> LoopBranches:
-    """Return branch of a spherical joint of a rod, for a known spin about the line of the rod."""
+    """Return the branch of a spherical joint of a rod, for a known spin about the rod."""
     before, after = ring.gaps[0].pose.inverse().p, ring.gaps[1].pose.p
     u, w = (after, before) if joint.sign > 0 else (before, after)
     u, w = u / casadi.norm_2(u), w / casadi.norm_2(w)

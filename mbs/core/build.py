@@ -47,7 +47,7 @@ class BuildError(RuntimeError):
 
 
 def source_sum() -> str:
-    """Return hash of the C files and flags. The built library contains the same hash as text."""
+    """Return the hash of the C files and flags. The built library contains it as text."""
     found = hashlib.sha256(" ".join(_FLAGS).encode())
     for file in sorted(SOURCE.glob("*.[ch]")):
         found.update(file.name.encode() + b"\0" + file.read_bytes())

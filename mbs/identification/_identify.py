@@ -288,7 +288,7 @@ class Identification:
         return with_parameters(self.system, bodies.columns, SX(DM(bodies.values)))
 
     def bodies_table(self) -> str:
-        """Return mass, centre of mass and inertia of every body in its own frame, as a text table.
+        """Return a text table of mass, centre of mass and inertia of every body in its own frame.
 
         Raises:
             ModelError: no bodies were found.

@@ -326,7 +326,7 @@ class Programme:
         return min(found, key=lambda pair: pair[0])[1]
 
     def _random(self, rates: Array, filled: float, rng: np.random.Generator) -> Array:
-        """Return variables of a random motion that uses the fraction `filled` of the joint ranges.
+        """Return the variables of a random motion over the fraction `filled` of the joint ranges.
 
         `rates` is the matrix of `_rates`.
         """

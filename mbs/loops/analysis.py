@@ -78,6 +78,9 @@ def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] 
     Raises:
         Unclosable: no configuration closes the loops.
         LoopError: the loops close in one singular configuration only, without motion.
+
+    Returns:
+        System at its assembled configuration, with closure, loops and motors.
     """
     p = closure_parameters(system)
     assembled = assembled_configuration(system, guess, p)

@@ -86,7 +86,7 @@ def _choose(system: System, active: Sequence[str]) -> tuple[int, ...]:
 
 
 def _laid_over(*guesses: Mapping[str, float]) -> dict[str, float]:
-    """Merge guesses {variable name: position}.
+    """Return the union of guesses, dicts from variable name to position.
 
     A later guess of a coordinate replaces earlier guesses.
     """

@@ -141,7 +141,7 @@ def _checked(system: System, q: Vector, branch: tuple[str, ...], p: Vector) -> M
 
 
 def _same(mode: Mode, other: Mode) -> bool:
-    """Whether the positions of two modes are equal to 1e-9."""
+    """Whether the positions of two modes are equal to 1e-9 rad or m."""
     return bool(np.max(np.abs(np.subtract(mode.q, other.q)), initial=0.0) < _SAME)
 
 
@@ -162,14 +162,9 @@ a fold, the closing iteration returns to the mode, to 1e-6."""
 def _of_blocks(system: System, steps: Sequence[Step], start: Vector, p: Vector) -> ModeList:
     """Return all modes of loops that are solved stage by stage and block by block.
 
-    Args:
-        system: assembled mechanism.
-        steps: closed forms and numerical blocks, in their order of solution.
-        start: all positions; the independent ones are known.
-        p: (np,) parameters.
-
-    Raises:
-        LoopError: the number of modes is infinite.
+    `steps` are closed forms and numerical blocks in their order of solution, `start` all positions
+    with the independent ones known, p (np,) the parameters. Raises LoopError if the number of modes
+    is infinite.
     """
     told = list[Roots]()
     try:

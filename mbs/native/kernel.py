@@ -444,7 +444,7 @@ def _write(entry: Path, name: str) -> None:
 
 
 def _index_key(text: str, options: str) -> str:
-    """Return hash of everything that determines the code: compiler, flags, generator, Function."""
+    """Return the hash of all that determines the code: compiler, flags, generator, Function."""
     compiler = find_compiler()
     facts = (casadi.CasadiMeta.version(), *compiler.command, compiler.version, processor())
     digest = hashlib.sha256()

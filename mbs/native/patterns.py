@@ -31,7 +31,7 @@ def pattern_source(jacobian: Function) -> str:
 
 
 def _blocks(function: Function) -> list[Sparsity]:
-    """Return sparsity of each Jacobian block: all inputs of the first output, then of the next."""
+    """Return the sparsity of each Jacobian block: all inputs of output 0, then of output 1, ..."""
     return [
         function.jac_sparsity(row, column)
         for row in range(function.n_out())

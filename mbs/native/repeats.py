@@ -375,7 +375,7 @@ class _Sequence:
         self.steps.append(self._new(Node(op, tuple(operands))))
 
     def operand(self, nodes: tuple[int, ...]) -> int:
-        """Return node of the sequence that represents one node of the whole graph per occurrence.
+        """Return the sequence node for one node of the whole graph per occurrence.
 
         It is a constant if all values are equal, else an element of the table of constants or a
         value that is computed outside.

@@ -156,7 +156,7 @@ class _Trace:
         ]
 
     def _step(self, op: int, node: MX, arguments: list[_Value]) -> Sequence[_Value]:
-        """Return results of one instruction of an MX Function, with CasADi operation code `op`."""
+        """Return the results of one instruction of an MX Function, with CasADi operation `op`."""
         if op == casadi.OP_CALL:
             return self.called(node.which_function(), arguments)
         if op == casadi.OP_HORZREPMAT:

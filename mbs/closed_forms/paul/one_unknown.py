@@ -45,7 +45,7 @@ class PaulStage:
     equations: tuple[Equation, ...]
 
     def factor(self, equation: Equation, key: Key) -> Factor:
-        """Return coefficient of the product of variables with exponents `key`, as an expression."""
+        """Return the coefficient of the monomial with exponents `key`, as an expression."""
         return factor(self.knowledge, self.matrices, equation, key)
 
     def number(self, variable: Variable) -> str:

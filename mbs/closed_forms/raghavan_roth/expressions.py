@@ -120,7 +120,7 @@ def dialytic(elimination: Elimination, E: SX) -> SX:
 
 
 def _pivot(values: Array) -> tuple[int, int]:
-    """Return row and column of the entry whose smallest magnitude over the samples is largest."""
+    """Return (row, column) of the entry whose smallest magnitude over the samples is largest."""
     smallest = np.min(np.abs(values), axis=0)
     r, c = np.unravel_index(first_best(smallest.ravel()), smallest.shape)
     return int(r), int(c)

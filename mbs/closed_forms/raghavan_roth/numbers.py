@@ -288,7 +288,7 @@ def eliminations(prismatic: Joints) -> list[Elimination]:
 
 
 def _elimination(prismatic: Joints, elements: NDArray[np.int64], raised: int) -> Elimination:
-    """Return elimination with these `elements` of w; `raised` is 0 for products by x4, 1 for x5."""
+    """Return the elimination with `elements` of w; `raised`: 0 for products by x4, 1 by x5."""
     slides = [bool(joint) for joint in prismatic]
     highest = 3 if len(elements) == SIZE else 2
     counts = [highest if slide else 3 for slide in slides]

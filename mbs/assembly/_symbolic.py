@@ -94,11 +94,11 @@ def adjustables(system: System) -> list[Adjustable]:
     Args:
         system: open or closed system.
     """
-    rows = [row for j, link in enumerate(system.tree.links) for row in _of_link(j, link)]
-    return [*rows, *_of_cuts(system), *_of_gravity(system)]
+    rows = [row for j, link in enumerate(system.tree.links) for row in _numbers_of_link(j, link)]
+    return [*rows, *_numbers_of_cuts(system), *_numbers_of_gravity(system)]
 
 
-def _of_link(j: int, link: Link) -> Iterator[Adjustable]:
+def _numbers_of_link(j: int, link: Link) -> Iterator[Adjustable]:
     """Yield the numbers of link j (index from 0) and of the fixed frames on the path to it."""
     for k, frame in enumerate(link.via):
         label = f"{j + 1}_{k + 1}"
@@ -119,7 +119,7 @@ def _of_link(j: int, link: Link) -> Iterator[Adjustable]:
         yield Adjustable(f"{kind}{j + 1}", kind, ("link", j), value, unit, f"{text} ({link.name})")
 
 
-def _of_cuts(system: System) -> Iterator[Adjustable]:
+def _numbers_of_cuts(system: System) -> Iterator[Adjustable]:
     """Yield the positions of the frames of cut joints, which may become symbols."""
     for cut in system.cuts:
         joint = cut.edge.joint.name
@@ -130,7 +130,7 @@ def _of_cuts(system: System) -> Iterator[Adjustable]:
                 yield Adjustable(name, axis, (joint, side), pose.p[row], "m", text)
 
 
-def _of_gravity(system: System) -> Iterator[Adjustable]:
+def _numbers_of_gravity(system: System) -> Iterator[Adjustable]:
     """Yield the three components of gravity, which may become symbols."""
     for row, axis in enumerate("xyz"):
         text = f"{axis} of the gravity acceleration in the base frame"
@@ -182,7 +182,7 @@ def symbolic(system: System, what: Sequence[str]) -> System:
             )
     symbols = {row.name: SX.sym(row.name) for row in rows}
     parameters = [Parameter(r.name, float(r.value), r.unit, r.description) for r in rows]
-    return _with(system, rows, symbols, parameters)
+    return _with_symbols(system, rows, symbols, parameters)
 
 
 def _names(system: System, what: Sequence[str]) -> list[str]:
@@ -213,7 +213,7 @@ def _choose(system: System, names: Sequence[str]) -> list[Adjustable]:
             _check_number(system, single[name])
             found = [single[name]]
         else:
-            found = _of_body(system, rows, name)
+            found = _numbers_of_body(system, rows, name)
         needed |= dict.fromkeys(row.name for row in found if not _is_itself(row, own))
     return [row for row in rows if row.name in needed]
 
@@ -241,7 +241,7 @@ def _check_number(system: System, row: Adjustable) -> None:
         )
 
 
-def _of_body(system: System, rows: Sequence[Adjustable], name: str) -> list[Adjustable]:
+def _numbers_of_body(system: System, rows: Sequence[Adjustable], name: str) -> list[Adjustable]:
     """Return the ten inertial parameters of the link of the body `name` that are not symbols yet.
 
     Raises ModelError if there is no such body, or if its link has further bodies with mass.
@@ -277,7 +277,7 @@ def _check_welds(system: System, rows: Sequence[Adjustable]) -> None:
             )
 
 
-def _with(
+def _with_symbols(
     system: System,
     rows: Sequence[Adjustable],
     symbols: _Symbols,
@@ -363,7 +363,9 @@ def _joint(row: JointRow, cuts: Sequence[Cut], given: _Given) -> JointRow:
 
     The row is unchanged if it has no cut joint with symbols.
     """
-    moves = [m for cut in cuts if cut.edge.joint.name == row.name for m in _moves(cut, given)]
+    moves = [
+        m for cut in cuts if cut.edge.joint.name == row.name for m in _moved_frames(cut, given)
+    ]
     if not moves:
         return row
 
@@ -373,7 +375,7 @@ def _joint(row: JointRow, cuts: Sequence[Cut], given: _Given) -> JointRow:
     return replace(row, frame_a=frame(row.frame_a), frame_b=frame(row.frame_b))
 
 
-def _moves(cut: Cut, given: _Given) -> Iterator[tuple[Frame, Frame]]:
+def _moved_frames(cut: Cut, given: _Given) -> Iterator[tuple[Frame, Frame]]:
     """Yield each frame of a cut joint with symbols, before and after the substitution."""
     for side, (link, pose) in zip("ab", cut.frames, strict=True):
         values = given.get((cut.edge.joint.name, side), {})

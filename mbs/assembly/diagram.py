@@ -207,8 +207,8 @@ def layout(graph: Connections) -> Layout:
     Args:
         graph: links and joints.
     """
-    hung = _hang(graph)
-    draft = _DiagramSoFar(graph, hung, {}, [], [], {})
+    hung = _cuts_below(graph)
+    draft = _Layout(graph, hung, {}, [], [], {})
     chain = _chain(graph) if not graph.cuts else []
     if len(chain) > _LONGEST + 1:
         draft.wrap(chain)
@@ -233,7 +233,7 @@ def _chain(graph: Connections) -> list[int]:
     return found
 
 
-def _hang(graph: Connections) -> dict[int, tuple[ConnectionEdge, ...]]:
+def _cuts_below(graph: Connections) -> dict[int, tuple[ConnectionEdge, ...]]:
     """Return for each link the cut joints to draw below it.
 
     A cut joint is drawn below the end link with fewer cut joints, and not below the base if
@@ -284,7 +284,7 @@ def _box_size(node: ConnectionNode) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, slots=True)
-class _DiagramSoFar:
+class _Layout:
     """Layout under construction: positions of the parts that are placed.
 
     `hung` maps link numbers to the cut joints that are drawn below the link.
@@ -416,7 +416,7 @@ def diagram(system: SystemData) -> Diagram:
         f'<text class="title" x="{_MARGIN}" y="28">{escape(_title(system))}</text>',
         f'<g transform="translate({shift:.1f} {_TITLE + top:.1f})">',
         *_wires(placed),
-        *(_pill(edge) for edge in (*placed.tree, *placed.cuts)),
+        *(_joint_label(edge) for edge in (*placed.tree, *placed.cuts)),
         *(_box(node) for node in placed.nodes.values()),
         "</g>",
         *_notes(graph.remarks, height),
@@ -513,7 +513,7 @@ def _box(placed: PlacedNode) -> str:
     return rect + "".join(texts)
 
 
-def _pill(placed: PlacedEdge) -> str:
+def _joint_label(placed: PlacedEdge) -> str:
     """Return the SVG text of the label of a joint."""
     edge = placed.edge
     look = f"{' active' if edge.driven else ''}{' loop' if edge.cut else ''}"
@@ -532,19 +532,19 @@ def _wires(placed: Layout) -> Iterator[str]:
     """Yield the SVG paths from links to joints, and of the cut joints."""
     for pill in placed.tree:
         first, second = (placed.nodes[end] for end in pill.edge.ends)
-        yield _wire(_descent(first, pill))
+        yield _wire(_path_down(first, pill))
         yield _wire(f"M{pill.x:.1f} {pill.y:.1f}L{second.x:.1f} {second.y:.1f}")
     entered: Counter[int] = Counter()
     risen = 0
     for pill in placed.cuts:
         owner, other = (placed.nodes[end] for end in pill.edge.ends)
-        yield _wire(_descent(owner, pill), " open")
+        yield _wire(_path_down(owner, pill), " open")
         if _rises(placed, pill):
             risen += 1
-            yield _wire(_round(pill, other, placed.width + _ASIDE * risen), " open")
+            yield _wire(_path_beside(pill, other, placed.width + _ASIDE * risen), " open")
         else:
             entered[other.node.number] += 1
-            yield _wire(_across(pill, other, entered[other.node.number], placed), " open")
+            yield _wire(_path_to_bottom(pill, other, entered[other.node.number], placed), " open")
 
 
 def _wire(path: str, more: str = "") -> str:
@@ -558,7 +558,7 @@ def _rises(placed: Layout, pill: PlacedEdge) -> bool:
     return other in placed.ancestors[owner]
 
 
-def _descent(node: PlacedNode, pill: PlacedEdge) -> str:
+def _path_down(node: PlacedNode, pill: PlacedEdge) -> str:
     """Return SVG path from a link to a joint label below it, or at the top of the next column."""
     foot = node.y + node.height / 2
     if pill.y > foot:
@@ -573,7 +573,7 @@ def _descent(node: PlacedNode, pill: PlacedEdge) -> str:
     )
 
 
-def _round(pill: PlacedEdge, other: PlacedNode, lane: float) -> str:
+def _path_beside(pill: PlacedEdge, other: PlacedNode, lane: float) -> str:
     """Return the SVG path from a cut joint along the right side (x = lane) up to link `other`."""
     foot, side = pill.y + PILL / 2, other.x + other.width / 2
     low = foot + 12
@@ -583,7 +583,7 @@ def _round(pill: PlacedEdge, other: PlacedNode, lane: float) -> str:
     )
 
 
-def _across(pill: PlacedEdge, other: PlacedNode, order: int, placed: Layout) -> str:
+def _path_to_bottom(pill: PlacedEdge, other: PlacedNode, order: int, placed: Layout) -> str:
     """Return the SVG path from a cut joint to the bottom of link `other`.
 
     It ends at the side of the link if joints are drawn below it. `order` is the number of such

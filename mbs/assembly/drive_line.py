@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 from casadi import SX
 
-from mbs.assembly.parts import FlangeTurn, as_fast, number_or_sx
+from mbs.assembly.component_instances import FlangeTurn, as_fast, number_or_sx
 from mbs.components import (
     Component,
     Coupling,
@@ -63,11 +63,11 @@ def check_flanges(mechanism: Description, parts: Sequence[Custom]) -> None:
                 " to nothing; connect it to another flange or leave the component out"
             )
     for flange in joined:
-        if _slides(flange):
+        if _is_translational(flange):
             _check_sliding(mechanism, flange, joined)
 
 
-def _slides(flange: Flange) -> bool | None:
+def _is_translational(flange: Flange) -> bool | None:
     """Whether a flange translates; None if it may translate or rotate."""
     owner = flange.owner
     if isinstance(owner, Custom):
@@ -87,7 +87,7 @@ def _check_sliding(
         for other in joined[queue.popleft()]:
             if other in seen:
                 continue
-            if _slides(other) is False:
+            if _is_translational(other) is False:
                 kind = "joint" if isinstance(start.owner, Joint) else type(start.owner).__name__
                 raise AssemblyError(
                     f"{mechanism.name}: {other} turns but {kind} {start.owner.name!r} slides; put"
@@ -105,7 +105,7 @@ def _fixed_flanges(
 ) -> dict[Key, FlangeTurn]:
     """Return the rotations, all zero, of the flanges that are rigidly connected to the housing.
 
-    `ties` are as returned by `_ties`.
+    `ties` are as returned by `_rigid_connections`.
 
     Raises:
         AssemblyError: a joint is connected to the housing.
@@ -154,7 +154,9 @@ def inertia_missing(mechanism: Description, flanges: Sequence[Flange]) -> Assemb
         flanges: one or more flanges.
     """
     names = ", ".join(str(flange) for flange in flanges)
-    verb, part = ("slide", "SlidingMass") if _slides(flanges[0]) else ("turn", "ShaftInertia")
+    verb, part = (
+        ("slide", "SlidingMass") if _is_translational(flanges[0]) else ("turn", "ShaftInertia")
+    )
     return AssemblyError(
         f"{mechanism.name}: {names} {verb} without any inertia and without a joint, so that their"
         f" acceleration is not determined; connect a {part} to them"
@@ -236,7 +238,7 @@ def _flange_rotations(
 
     The first dict has the names of the coordinates as keys, the second the keys of the flanges.
     """
-    ties = _ties(mechanism, parts)
+    ties = _rigid_connections(mechanism, parts)
     values = _generic(mechanism)
     references: dict[str, Flange] = {}
     turns = _fixed_flanges(mechanism, parts, ties)
@@ -286,7 +288,7 @@ def _candidates(mechanism: Description, parts: tuple[Custom, ...]) -> Iterator[t
             yield f"{part.name}.rotor", part.flanges[0]
 
 
-def _ties(
+def _rigid_connections(
     mechanism: Description, parts: tuple[Custom, ...]
 ) -> dict[Key, list[tuple[Key, Expression]]]:
     """Return for each flange the rigidly connected flanges and their angle ratios."""
@@ -353,7 +355,7 @@ def _group_joint(
         factor = turns[part.flanges[0].key].factor
         total = _plus(total, times(times(factor, factor), part.own_inertia))
     if not isinstance(reference.owner, Joint):
-        kind = Prismatic if _slides(reference) else Revolute
+        kind = Prismatic if _is_translational(reference) else Revolute
         return kind(name, axis="z", actuated=bool(devices), Ia=total)
     joint = reference.owner
     if devices and joint.actuated is False:
@@ -382,7 +384,9 @@ def _lower(
             result.add(Coupling(name, joint.name, turn.coordinate, row))
     for force in mechanism.components.values():
         if isinstance(force, ShaftForce):
-            result.components[force.name] = replace(force, levers=_levers(mechanism, force, turns))
+            result.components[force.name] = replace(
+                force, levers=_moment_arms(mechanism, force, turns)
+            )
     for name, joint in changed.items():
         if name not in joints:
             result.components.pop(name, None)
@@ -411,7 +415,7 @@ def _with_joints(mechanism: Description, joints: Mapping[str, Joint]) -> Descrip
     return result
 
 
-def _levers(
+def _moment_arms(
     mechanism: Description, part: ShaftForce, turns: Mapping[Key, FlangeTurn]
 ) -> tuple[tuple[str, Expression], ...]:
     """Return the moment arms of a force between shafts, as pairs of coordinate and factor.
@@ -480,7 +484,7 @@ def shaft_rows(line: DriveLine, symbols: Mapping[str, SX]) -> tuple[ShaftRow, ..
         own = line.links.get(turn.coordinate) == part.name
         if own or isinstance(part, (RigidPart, IdealGear)):
             factor = number_or_sx(to_sx(turn.factor, symbols))
-            slides = _slides(part.flanges[0]) is True
+            slides = _is_translational(part.flanges[0]) is True
             kind = type(part).__name__
             rows.append(ShaftRow(part.name, kind, turn.coordinate, own, factor, slides))
     return tuple(rows)

@@ -100,7 +100,7 @@ def connection_graph(
     home: dict[Port, int] = {}
     for port in _ports(mechanism):
         if port not in home:
-            members = _grow(port, welds, at)
+            members = _welded_to(port, welds, at)
             home.update(dict.fromkeys(members, len(nodes)))
             nodes.append(BodyNode(port[0], members))
     edges = tuple(
@@ -202,7 +202,7 @@ def _require_connected(
             )
 
 
-def _grow(
+def _welded_to(
     start: Port,
     welds: Mapping[Port, list[tuple[Port, Pose]]],
     at: _Evaluator,

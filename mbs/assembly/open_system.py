@@ -7,19 +7,19 @@ from collections.abc import Collection, Mapping, Sequence
 import casadi
 from casadi import SX
 
-from mbs.assembly.drive_line import drive_line, shaft_rows
-from mbs.assembly.graph import BodyGraph, connection_graph, spanning_tree
-from mbs.assembly.inertias import inertia_notes
-from mbs.assembly.khalil_frames import Cut, KhalilTree, khalil_frames
-from mbs.assembly.parameter_bounds import bounded_fields, parameter_bounds
-from mbs.assembly.parts import (
+from mbs.assembly.component_instances import (
     ComponentInstance,
     attached_parts,
     coordinates_needed,
     symbols_in_order,
     with_unknowns,
 )
-from mbs.assembly.proof import prove
+from mbs.assembly.drive_line import drive_line, shaft_rows
+from mbs.assembly.graph import BodyGraph, connection_graph, spanning_tree
+from mbs.assembly.inertias import inertia_notes
+from mbs.assembly.khalil_frames import Cut, KhalilTree, khalil_frames
+from mbs.assembly.parameter_bounds import bounded_fields, parameter_bounds
+from mbs.assembly.pose_check import check_poses
 from mbs.assembly.system import System
 from mbs.assembly.tables import (
     BodyRow,
@@ -75,7 +75,7 @@ def open_system(mechanism: Description, guessed: Collection[str] = ()) -> System
     )
     framed = khalil_frames(mechanism, graph, spanning, symbols)
     places = _places(graph, framed)
-    prove(mechanism, framed, places, symbols, _trial_values(parameters))
+    check_poses(mechanism, framed, places, symbols, _trial_values(parameters))
     on_links = [(body, places[body.name, ""][0]) for body in faulty]
     notes += [note for note in inertia_notes(framed.tree, on_links) if note not in notes]
     joints = {joint.name: joint for joint in mechanism.joints()}

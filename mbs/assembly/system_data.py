@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 from casadi import SX
 
+from mbs.assembly.component_instances import ComponentInstance, Quantity
 from mbs.assembly.drive_line import ShaftRow
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.parameter_bounds import BoundedField, Bounds
-from mbs.assembly.parts import ComponentInstance, Quantity
 from mbs.assembly.tables import (
     AttachedSensor,
     Balance,

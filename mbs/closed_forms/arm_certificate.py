@@ -89,9 +89,9 @@ def _completed(ways: Array, loop: Arrangement, middle: Complex) -> Complex:
     beyond, goal = np.tile(ways[1].astype(np.complex128), (len(middle), 1, 1)), inverse(ways[5])
     for k in (2, 3, 4):
         beyond = beyond @ motion(middle[:, k - 2], bool(loop.prismatic[k])) @ ways[k]
-    number, second = _second(ways[0], loop.prismatic, beyond, goal)
+    number, second = _second_positions(ways[0], loop.prismatic, beyond, goal)
     near = ways[0] @ motion(second, bool(loop.prismatic[1])) @ beyond[number]
-    first = _first(bool(loop.prismatic[0]), near, goal)
+    first = _first_positions(bool(loop.prismatic[0]), near, goal)
     left = inverse(motion(first, bool(loop.prismatic[0])) @ near) @ goal
     sixth = _angle(left[:, 0, 0] + left[:, 1, 1], left[:, 1, 0] - left[:, 0, 1])
     whole = np.column_stack([first, second, middle[number], sixth])
@@ -109,7 +109,7 @@ def _angle(c: Complex, s: Complex) -> Complex:
     return np.where(np.real(size) < 0, q + np.pi, q)
 
 
-def _first(prismatic: bool, near: Complex, goal: Array) -> Complex:
+def _first_positions(prismatic: bool, near: Complex, goal: Array) -> Complex:
     """Return positions (n,) of joint 1 that move origin and z axis of poses `near` to `goal`."""
     if prismatic:
         slide: Complex = goal[2, 3] - near[:, 2, 3]
@@ -121,7 +121,7 @@ def _first(prismatic: bool, near: Complex, goal: Array) -> Complex:
     return _angle(np.sum(x * X + y * Y, axis=1) / square, np.sum(x * Y - y * X, axis=1) / square)
 
 
-def _second(
+def _second_positions(
     way: Array, prismatic: NDArray[np.bool_], beyond: Complex, goal: Array
 ) -> tuple[NDArray[np.int64], Complex]:
     """Return row indices and positions of joint 2, for poses `beyond` (n, 4, 4) that it moves.
@@ -207,17 +207,17 @@ def certified_roots(arm: Arm, T: Array, candidates: Complex) -> CertifiedRoots:
         candidates: (m, 6) complex configurations [rad or m].
     """
     length = loop_length(arm)
-    inner, target = _inner(arm, T, length)
+    inner, target = _without_base_and_tool(arm, T, length)
     q = np.where(arm.prismatic, candidates / length, candidates)
     with np.errstate(all="ignore"):
         for _ in range(_NEWTON):
-            rows, J, *_ = _rows(inner, target, q)
+            rows, J, *_ = _pose_equations(inner, target, q)
             finite = np.all(np.isfinite(J), axis=(1, 2)) & np.all(np.isfinite(rows), axis=1)
             q, rows, J = q[finite], rows[finite], J[finite]
             q = q - solved(J, rows[..., None])[..., 0]
         # rounding may have spoilt one of two conjugate roots
         q = np.concatenate([q, q.conj()])
-        rows, J, norms, gap = _rows(inner, target, q)
+        rows, J, norms, gap = _pose_equations(inner, target, q)
         W = solved(J, np.broadcast_to(np.eye(6, dtype=np.complex128), J.shape))
         gain = np.sum(norms * np.linalg.norm(W, axis=2), axis=1)
         step = np.sum(norms * np.abs(np.einsum("mij,mj->mi", W, rows)), axis=1)
@@ -234,7 +234,7 @@ def certified_roots(arm: Arm, T: Array, candidates: Complex) -> CertifiedRoots:
     return CertifiedRoots(q[kept], radius[kept])
 
 
-def _inner(arm: Arm, T: Array, length: float) -> tuple[Arm, Array]:
+def _without_base_and_tool(arm: Arm, T: Array, length: float) -> tuple[Arm, Array]:
     """Return the arm from its first to its last joint, and its target, in units of `length`."""
     first, last = inverse(arm.gaps[0]), inverse(arm.gaps[-1])
     gaps, target = arm.gaps.copy(), first @ T @ last
@@ -244,7 +244,7 @@ def _inner(arm: Arm, T: Array, length: float) -> tuple[Arm, Array]:
     return Arm(arm.names, arm.prismatic, gaps), target
 
 
-def _rows(arm: Arm, target: Array, q: Complex) -> tuple[Complex, Complex, Array, Array]:
+def _pose_equations(arm: Arm, target: Array, q: Complex) -> tuple[Complex, Complex, Array, Array]:
     """Return equations (m, 6), derivatives (m, 6, 6), norms of twists (m, 6), and |X - 1| (m,).
 
     X is the pose error at q (m, 6). The reference is the middle of the arm, where complex angles
@@ -270,7 +270,7 @@ def _rows(arm: Arm, target: Array, q: Complex) -> tuple[Complex, Complex, Array,
     slopes = np.concatenate([X @ twists[:3], twists[3:] @ X])
     norms = np.linalg.norm(twists, axis=(2, 3)).T
     gap = np.linalg.norm(X - np.eye(4), axis=(1, 2))
-    return _six(X), np.moveaxis(_six(slopes), 0, -1), norms, gap
+    return _position_and_skew(X), np.moveaxis(_position_and_skew(slopes), 0, -1), norms, gap
 
 
 def _skew(axis: Complex) -> Complex:
@@ -280,7 +280,7 @@ def _skew(axis: Complex) -> Complex:
     return np.moveaxis(np.array([[o, -z, y], [z, o, -x], [-y, x, o]]), (0, 1), (-2, -1))
 
 
-def _six(X: Complex) -> Complex:
+def _position_and_skew(X: Complex) -> Complex:
     """Return positions and skew parts of rotations (..., 6) of matrices X (..., 4, 4)."""
     R = X[..., :3, :3]
     turned = [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]]

@@ -145,11 +145,13 @@ def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Arr
         T: (4, 4) target pose of all, or (m, 4, 4) of each.
         q: (m, n) configurations [rad or m].
     """
-    own, residual, _ = _rooms(len(q), arm.size)
+    own, residual, _ = _output_arrays(len(q), arm.size)
     own[:] = q
     target = _targets(T, len(q))
-    stride, handed = 16 if target.ndim == 3 else 0, handed_of(arm)
-    library.mbs_polish(handed.address, _at(target), stride, len(q), _at(own), _at(residual))
+    stride, handed = 16 if target.ndim == 3 else 0, c_arm_of(arm)
+    library.mbs_polish(
+        handed.address, _address(target), stride, len(q), _address(own), _address(residual)
+    )
     return own, residual
 
 
@@ -168,11 +170,17 @@ def found_by(
     Returns:
         (m, n) distinct solutions [rad or m], and (m,) number of starts that converged to each.
     """
-    target = _wanted(T, 4, 4)
-    q, residual, hits = _rooms(starts, arm.size)
-    handed = handed_of(arm)
+    target = _c_array(T, 4, 4)
+    q, residual, hits = _output_arrays(starts, arm.size)
+    handed = c_arm_of(arm)
     count = library.mbs_search(
-        handed.address, _at(target), starts, seed, _at(q), _at(residual), hits.ctypes.data
+        handed.address,
+        _address(target),
+        starts,
+        seed,
+        _address(q),
+        _address(residual),
+        hits.ctypes.data,
     )
     return q[:count].copy(), hits[:count].copy()
 
@@ -186,12 +194,17 @@ def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array
         T: (4, 4) target pose [m].
         q: (m, n) solutions [rad or m].
     """
-    target = _wanted(T, 4, 4)
-    own, residual, hits = _rooms(len(q), arm.size)
+    target = _c_array(T, 4, 4)
+    own, residual, hits = _output_arrays(len(q), arm.size)
     own[:] = q
-    handed = handed_of(arm)
+    handed = c_arm_of(arm)
     count = library.mbs_merge(
-        handed.address, _at(target), len(q), _at(own), _at(residual), hits.ctypes.data
+        handed.address,
+        _address(target),
+        len(q),
+        _address(own),
+        _address(residual),
+        hits.ctypes.data,
     )
     return own[:count].copy(), hits[:count].copy()
 
@@ -206,9 +219,9 @@ def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int)
         starts: number of random configurations.
         seed: seed of the random numbers.
     """
-    target, q = _wanted(T, 4, 4), np.empty(arm.size)
-    handed = handed_of(arm)
-    library.mbs_nearest(handed.address, _at(target), starts, seed, _at(q))
+    target, q = _c_array(T, 4, 4), np.empty(arm.size)
+    handed = c_arm_of(arm)
+    library.mbs_nearest(handed.address, _address(target), starts, seed, _address(q))
     return q
 
 
@@ -221,9 +234,9 @@ def singular_by(library: ctypes.CDLL, arm: Arm, q: Array, bound: float) -> NDArr
         q: (m, n) configurations [rad or m].
         bound: bound of the singular value, with lengths in arm lengths.
     """
-    own, singular = _wanted(q, len(q), arm.size), np.empty(len(q), dtype=bool)
-    handed = handed_of(arm)
-    library.mbs_singular(handed.address, bound, len(q), _at(own), singular.ctypes.data)
+    own, singular = _c_array(q, len(q), arm.size), np.empty(len(q), dtype=bool)
+    handed = c_arm_of(arm)
+    library.mbs_singular(handed.address, bound, len(q), _address(own), singular.ctypes.data)
     return singular
 
 
@@ -247,10 +260,17 @@ def corrected_by(
     m, n = len(x), arm.size
     own = np.array(np.broadcast_to(x, (m, n)), dtype=float, order="C")
     target = _targets(T, m)
-    stride, handed = 16 if target.ndim == 3 else 0, handed_of(arm)
-    rows, right = _wanted(held, m, n), _wanted(value, m)
+    stride, handed = 16 if target.ndim == 3 else 0, c_arm_of(arm)
+    rows, right = _c_array(held, m, n), _c_array(value, m)
     library.mbs_correct(
-        handed.address, _at(target), stride, m, _at(rows), _at(right), iterations, _at(own)
+        handed.address,
+        _address(target),
+        stride,
+        m,
+        _address(rows),
+        _address(right),
+        iterations,
+        _address(own),
     )
     return own
 
@@ -264,10 +284,12 @@ def residual_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> Array:
         T: (4, 4) target pose of all, or (m, 4, 4) of each.
         q: (m, n) configurations [rad or m].
     """
-    own, target, residual = _wanted(q, *q.shape), _targets(T, len(q)), np.empty(len(q))
-    handed = handed_of(arm)
+    own, target, residual = _c_array(q, *q.shape), _targets(T, len(q)), np.empty(len(q))
+    handed = c_arm_of(arm)
     stride = 16 if target.ndim == 3 else 0
-    library.mbs_residual(handed.address, _at(target), stride, len(q), _at(own), _at(residual))
+    library.mbs_residual(
+        handed.address, _address(target), stride, len(q), _address(own), _address(residual)
+    )
     return residual
 
 
@@ -283,11 +305,13 @@ def examined_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Arr
         q: (m, n) configurations [rad or m].
     """
     m, n = q.shape
-    own, target = _wanted(q, m, n), _targets(T, m)
+    own, target = _c_array(q, m, n), _targets(T, m)
     gap, J = np.empty((m, 6)), np.empty((m, n, 6))
-    handed = handed_of(arm)
+    handed = c_arm_of(arm)
     stride = 16 if target.ndim == 3 else 0
-    library.mbs_examine(handed.address, _at(target), stride, m, _at(own), _at(gap), _at(J))
+    library.mbs_examine(
+        handed.address, _address(target), stride, m, _address(own), _address(gap), _address(J)
+    )
     return gap, np.swapaxes(J, 1, 2)
 
 
@@ -304,9 +328,11 @@ def on_sphere_by(
         radius: distance from the centre.
         x: (m, n) first guesses.
     """
-    own, middle = np.array(x, dtype=float, order="C"), _wanted(centre, arm.size)
-    target, handed = _wanted(T, 4, 4), handed_of(arm)
-    library.mbs_reach_sphere(handed.address, _at(target), _at(middle), radius, len(own), _at(own))
+    own, middle = np.array(x, dtype=float, order="C"), _c_array(centre, arm.size)
+    target, handed = _c_array(T, 4, 4), c_arm_of(arm)
+    library.mbs_reach_sphere(
+        handed.address, _address(target), _address(middle), radius, len(own), _address(own)
+    )
     return own
 
 
@@ -338,11 +364,17 @@ def reduced_by(
     """
     count, corank = h.shape
     held = [np.ascontiguousarray(part, dtype=float) for part in parts]
-    own = _ReductionStruct(corank, *map(_at, held))
+    own = _ReductionStruct(corank, *map(_address, held))
     x, g = np.empty((count, arm.size)), np.empty((count, len(held[2])))
-    target, given, handed = _wanted(T, 4, 4), _wanted(h, count, corank), handed_of(arm)
+    target, given, handed = _c_array(T, 4, 4), _c_array(h, count, corank), c_arm_of(arm)
     found = library.mbs_reduced(
-        handed.address, _at(target), ctypes.addressof(own), count, _at(given), _at(x), _at(g)
+        handed.address,
+        _address(target),
+        ctypes.addressof(own),
+        count,
+        _address(given),
+        _address(x),
+        _address(g),
     )
     return x, g, bool(found)
 
@@ -369,17 +401,17 @@ def walked_by(
         most: maximum number of points.
         sided: whether the path must stay on one of two curves that pass close by each other.
     """
-    points, target = np.empty((most + 1, arm.size)), _wanted(T, 4, 4)
+    points, target = np.empty((most + 1, arm.size)), _c_array(T, 4, 4)
     points[0] = start
-    along, closed, handed = _wanted(tangent, arm.size), ctypes.c_int(0), handed_of(arm)
+    along, closed, handed = _c_array(tangent, arm.size), ctypes.c_int(0), c_arm_of(arm)
     count = library.mbs_walk(
         handed.address,
-        _at(target),
-        _at(along),
+        _address(target),
+        _address(along),
         limit,
         most,
         sided,
-        _at(points),
+        _address(points),
         ctypes.addressof(closed),
     )
     return points[:count].copy(), bool(closed.value)
@@ -393,7 +425,7 @@ def rounded_by(library: ctypes.CDLL, T: Array) -> Array | None:
         T: (4, 4) matrix.
     """
     own = np.array(T, dtype=float, order="C")
-    return own if library.mbs_round(_at(own)) else None
+    return own if library.mbs_round(_address(own)) else None
 
 
 def settled_by(
@@ -420,14 +452,14 @@ def settled_by(
     """
     q, residual = every[:2]
     number, count = np.empty(len(residual)), ctypes.c_longlong(0)
-    target = _wanted(T, 4, 4)
+    target = _c_array(T, 4, 4)
     doubtful = library.mbs_settle(
         handed.address,
-        _at(target),
+        _address(target),
         len(residual),
-        *map(_at, every),
+        *map(_address, every),
         *bounds,
-        _at(number),
+        _address(number),
         ctypes.addressof(count),
     )
     m = count.value
@@ -449,7 +481,7 @@ class CArm:
 
 
 @functools.lru_cache(maxsize=256)
-def handed_of(arm: Arm) -> CArm:
+def c_arm_of(arm: Arm) -> CArm:
     """Return the C structure of an arm, cached, because an arm is immutable.
 
     Args:
@@ -458,7 +490,7 @@ def handed_of(arm: Arm) -> CArm:
     return CArm(arm)
 
 
-def _wanted(T: Array, *shape: int) -> Array:
+def _c_array(T: Array, *shape: int) -> Array:
     """Return T as a C-contiguous array of doubles of this shape, for a C function.
 
     Raises ValueError if T cannot be broadcast to the shape, since C code does not check it.
@@ -470,15 +502,15 @@ def _wanted(T: Array, *shape: int) -> Array:
 
 def _targets(T: Array, count: int) -> Array:
     """Return target poses as an array for C: (4, 4) for all configurations, or (count, 4, 4)."""
-    return _wanted(T, *((4, 4) if np.ndim(T) == 2 else (count, 4, 4)))
+    return _c_array(T, *((4, 4) if np.ndim(T) == 2 else (count, 4, 4)))
 
 
-def _rooms(count: int, n: int) -> tuple[Array, Array, Hits]:
+def _output_arrays(count: int, n: int) -> tuple[Array, Array, Hits]:
     """Return uninitialised arrays for `count` configurations of n joints, residuals and hits."""
     return np.empty((count, n)), np.empty(count), np.empty(count, dtype=np.int64)
 
 
-def _at(array: Array) -> int:
+def _address(array: Array) -> int:
     """Return the memory address of the data of an array."""
     return int(array.ctypes.data)
 
@@ -517,7 +549,7 @@ class _LoopStruct(ctypes.Structure):
     )
 
 
-class HandedLoop:
+class CLoop:
     """C structure of an arm prepared for the general method, and the arrays that it points to.
 
     Attributes:
@@ -528,11 +560,11 @@ class HandedLoop:
     def __init__(self, arm: Arm, prepared: Prepared) -> None:
         loop, pencil = prepared.arrangement, prepared.pencil
         elimination = pencil.elimination
-        self.arm = handed_of(arm)
-        self.next: HandedLoop | None = None
+        self.arm = c_arm_of(arm)
+        self.next: CLoop | None = None
         if prepared.others:
             first, *others = prepared.others
-            self.next = HandedLoop(arm, replace(first, others=tuple(others)))
+            self.next = CLoop(arm, replace(first, others=tuple(others)))
         self.mix = np.ascontiguousarray(pencil.mix, dtype=float)
         square = self.mix.shape[0] == self.mix.shape[1]
         parts = ("first", "second", "third", "fourth", "fifth")
@@ -558,7 +590,7 @@ class HandedLoop:
         self.address: int = ctypes.addressof(self.loop)
 
 
-def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbers, Array]:
+def solved_by(library: ctypes.CDLL, handed: CLoop, T: Array) -> tuple[Numbers, Array]:
     """Return the solutions of the general method (Raghavan and Roth) for many poses.
 
     Args:
@@ -594,7 +626,7 @@ def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbe
     return np.concatenate(numbers), np.concatenate(configurations)
 
 
-def candidates_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> Array:
+def candidates_by(library: ctypes.CDLL, handed: CLoop, T: Array) -> Array:
     """Return configurations (m, 6) that may reach a pose, neither polished nor checked.
 
     Args:
@@ -602,8 +634,8 @@ def candidates_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> Array:
         handed: arm prepared for the general method.
         T: (4, 4) target pose [m].
     """
-    target, q = _wanted(T, 4, 4), np.empty((_CANDIDATES, 6))
-    return q[: library.mbs_candidates(handed.address, _at(target), _at(q))].copy()
+    target, q = _c_array(T, 4, 4), np.empty((_CANDIDATES, 6))
+    return q[: library.mbs_candidates(handed.address, _address(target), _address(q))].copy()
 
 
 # General method of an arm as a Function with C code that contains the numbers of the arm.
@@ -654,7 +686,7 @@ class SolverStruct(ctypes.Structure):
 
 
 def general_function(
-    name: str, handed: HandedLoop, indices: Sequence[int], others: Array, nearly: float
+    name: str, handed: CLoop, indices: Sequence[int], others: Array, nearly: float
 ) -> Function:
     """Return the Function ``name(T) -> q, valid, count, certain`` of the general method, in C.
 
@@ -703,7 +735,7 @@ def general_function(
     return handwritten(signature, jacobian, own, _files(_SOURCES), work)
 
 
-def _loop_tables(handed: HandedLoop, number: int = 0) -> str:
+def _loop_tables(handed: CLoop, number: int = 0) -> str:
     """Return the C text of a prepared loop with index `number`, after those of its alternatives."""
     owned, text = dict[str, str](), ""
     if handed.next is not None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 import mbs.closed_forms.arm_core as core
 from mbs.closed_forms.arm import Arm, Array, gap_to
-from mbs.closed_forms.arm_core import HandedLoop, Numbers, solved_by
+from mbs.closed_forms.arm_core import CLoop, Numbers, solved_by
 from mbs.closed_forms.raghavan_roth.numbers import Prepared, prepare
 from mbs.errors import NoClosedForm
 
@@ -230,7 +230,7 @@ class General:
 
     arm: Arm
     prepared: Prepared
-    handed: HandedLoop
+    handed: CLoop
 
 
 def general_of(arm: Arm) -> General:
@@ -250,7 +250,7 @@ def general_of(arm: Arm) -> General:
             f" singular at every configuration (its regularity is {prepared.regularity:.0e}); use"
             " method='search'"
         )
-    return General(arm, prepared, HandedLoop(arm, prepared))
+    return General(arm, prepared, CLoop(arm, prepared))
 
 
 def general(arm: General, T: Array) -> Array:

@@ -36,7 +36,7 @@ _SIZE = 8
 _ROWS = LEGS + 1
 
 
-def _left(a: Complex) -> Complex:
+def _left_products(a: Complex) -> Complex:
     """Return the matrices (..., 4, 4) of the quaternion products a q, for vectors a (..., 3)."""
     x, y, z = np.moveaxis(a, -1, 0)
     o = np.zeros_like(x)
@@ -45,7 +45,7 @@ def _left(a: Complex) -> Complex:
     return product
 
 
-def _right(b: Complex) -> Complex:
+def _right_products(b: Complex) -> Complex:
     """Return the matrices (..., 4, 4) of quaternion products q b for vectors b (..., 3)."""
     x, y, z = np.moveaxis(b, -1, 0)
     o = np.zeros_like(x)
@@ -75,9 +75,9 @@ class PlatformLegs:
         """
         Q = np.zeros((_ROWS, _SIZE, _SIZE), dtype=np.complex128)
         Q[:LEGS, 4:, 4:] = np.eye(4)
-        N = _right(self.b) - _left(self.a)
+        N = _right_products(self.b) - _left_products(self.a)
         Q[:LEGS, 4:, :4], Q[:LEGS, :4, 4:] = N, np.swapaxes(N, 1, 2)
-        Q[:LEGS, :4, :4] = 2 * _left(self.a) @ _right(self.b)
+        Q[:LEGS, :4, :4] = 2 * _left_products(self.a) @ _right_products(self.b)
         Q[:LEGS, :4, :4] += self.c[:, None, None] * np.eye(4)
         Q[LEGS, 4:, :4] = Q[LEGS, :4, 4:] = np.eye(4)
         return Q
@@ -127,12 +127,14 @@ class Homotopy:
         return 2 * (J + s * (Y[:, 1] + s * Y[:, 2])), rate
 
 
-def _square(J: Complex, patch: Complex) -> Complex:
+def _with_patch(J: Complex, patch: Complex) -> Complex:
     """Append the row `patch` (r, 8) to J (r, 7, 8); it keeps the length of x constant."""
     return np.concatenate([J, patch.conj()[:, None, :]], axis=1)
 
 
-def _correction(path: Homotopy, x: Complex, t: Real, patch: Complex) -> tuple[Complex, Complex]:
+def _newton_step_and_tangent(
+    path: Homotopy, x: Complex, t: Real, patch: Complex
+) -> tuple[Complex, Complex]:
     """Return Newton's step and the tangent dx/dt of a homotopy path at x, t, both (r, 8).
 
     `patch` (r, 8) is normal to both.
@@ -140,7 +142,7 @@ def _correction(path: Homotopy, x: Complex, t: Real, patch: Complex) -> tuple[Co
     J, rate = path.slopes(x, t)
     sides = np.zeros((len(x), _SIZE, 2), dtype=np.complex128)
     sides[:, :_ROWS, 0], sides[:, :_ROWS, 1] = np.einsum("rij,rj->ri", J, x) / 2, rate
-    step = -solved(_square(J, patch), sides)
+    step = -solved(_with_patch(J, patch), sides)
     return step[..., 0], step[..., 1]
 
 
@@ -155,7 +157,9 @@ def follow(path: Homotopy, x: Complex, tolerance: float = TOLERANCE) -> tuple[Co
     Returns:
         (r, 8) ends of length one, and (r,) reached t; 1 on a path that was followed completely.
     """
-    return homotopy.follow(functools.partial(_correction, path), x, _in_patch, tolerance)
+    return homotopy.follow(
+        functools.partial(_newton_step_and_tangent, path), x, _in_patch, tolerance
+    )
 
 
 def _in_patch(x: Complex, slope: Complex) -> tuple[Complex, Complex]:
@@ -206,7 +210,7 @@ def certify(legs: PlatformLegs, x: Complex, t: Real) -> PathEnds:
     for _ in range(3):
         now = np.flatnonzero(regular)
         if len(now):
-            y = x[now] + _correction(path, x[now], t[now], x[now])[0]
+            y = x[now] + _newton_step_and_tangent(path, x[now], t[now], x[now])[0]
             regular[now] = np.all(np.isfinite(y), axis=1)
             with np.errstate(invalid="ignore"):
                 y /= np.linalg.norm(y, axis=1, keepdims=True)
@@ -215,7 +219,7 @@ def certify(legs: PlatformLegs, x: Complex, t: Real) -> PathEnds:
     y, zero = x[number], np.zeros(len(number))
     J, _ = path.slopes(y, zero)
     unit = np.broadcast_to(np.eye(_SIZE, dtype=np.complex128), (len(y), _SIZE, _SIZE))
-    W = solved(_square(J, y), unit)[..., :_ROWS]
+    W = solved(_with_patch(J, y), unit)[..., :_ROWS]
     newton = np.einsum("rij,rj->ri", W, np.einsum("rij,rj->ri", J, y) / 2)
     bend = np.linalg.norm(W @ path.Q[0].reshape(_ROWS, _SIZE * _SIZE), axis=(1, 2))
     certain = np.linalg.norm(newton, axis=1) * bend < _CERTAIN
@@ -277,7 +281,7 @@ def monodromy(seed: int, most: int = 200) -> StartSystem:
         rng.normal(size=4) + 1j * rng.normal(size=4),
         rng.normal(size=3) + 1j * rng.normal(size=3),
     )
-    first = np.concatenate([e, _left(p) @ e])
+    first = np.concatenate([e, _left_products(p) @ e])
     # constants for which `first` is a root
     rest = np.einsum("i,kij,j->k", first, legs.forms()[:LEGS], first)
     legs = PlatformLegs(legs.a, legs.b, legs.c - rest / (e @ e))
@@ -297,7 +301,7 @@ def monodromy(seed: int, most: int = 200) -> StartSystem:
 
 
 def text_of(start: StartSystem) -> str:
-    """Return a platform and its roots as JSON text for a file, which `kept_start` reads.
+    """Return a platform and its roots as JSON text for a file, which `stored_start` reads.
 
     Args:
         start: platform and roots.
@@ -307,7 +311,7 @@ def text_of(start: StartSystem) -> str:
 
 
 @functools.cache
-def kept_start(number: int) -> StartSystem:
+def stored_start(number: int) -> StartSystem:
     """Return a platform with its forty roots from a file of this package.
 
     Args:
@@ -321,7 +325,7 @@ def kept_start(number: int) -> StartSystem:
 
 
 @functools.lru_cache(maxsize=16)
-def own_start(a: bytes, b: bytes) -> StartSystem:
+def platform_start(a: bytes, b: bytes) -> StartSystem:
     """Return all roots of a platform for random complex leg lengths, as start for any lengths.
 
     Special ends of the legs have fewer than forty roots: 28 for semi-regular hexagons, 16 for legs
@@ -335,10 +339,10 @@ def own_start(a: bytes, b: bytes) -> StartSystem:
     """
     ends = [np.frombuffer(told).reshape(LEGS, 3).astype(complex) for told in (a, b)]
     rng = np.random.default_rng(_SEED)
-    legs, second, third = (PlatformLegs(ends[0], ends[1], _lengths(rng)) for _ in range(3))
+    legs, second, third = (PlatformLegs(ends[0], ends[1], _random_lengths(rng)) for _ in range(3))
     x, counts = np.zeros((0, _SIZE), dtype=complex), list[int]()
     for number in (0, 1):
-        kept = kept_start(number)
+        kept = stored_start(number)
         y, t = follow(Homotopy.between(kept.legs, legs), kept.x)
         own = certify(legs, y, t)
         counts.append(int(np.sum(own.regular)))
@@ -351,7 +355,7 @@ def own_start(a: bytes, b: bytes) -> StartSystem:
             y = y[t >= 1]
         known, x = len(x), _distinct_roots(legs, np.concatenate([x, y]))
         idle = idle + 1 if len(x) == known else 0
-        second, third = (PlatformLegs(ends[0], ends[1], _lengths(rng)) for _ in range(2))
+        second, third = (PlatformLegs(ends[0], ends[1], _random_lengths(rng)) for _ in range(2))
     return StartSystem(legs, x)
 
 
@@ -359,7 +363,7 @@ _IDLE = 3
 """Number of closed paths without new roots after which the roots count as complete."""
 
 
-def _lengths(rng: np.random.Generator) -> Complex:
+def _random_lengths(rng: np.random.Generator) -> Complex:
     """Return random complex constants c (6,) of `PlatformLegs`, which determine leg lengths."""
     return rng.normal(size=LEGS) + 1j * rng.normal(size=LEGS)
 
@@ -430,9 +434,9 @@ def poses(a: Real, b: Real, length: Real) -> Poses:
     Raises:
         LoopError: the platform can move for constant leg lengths at every pose.
     """
-    middle, own, size = a.mean(axis=0), b.mean(axis=0), _size(a, b)
+    middle, own, size = a.mean(axis=0), b.mean(axis=0), _platform_size(a, b)
     a0, b0 = (a - middle) / size, (b - own) / size
-    if not holds(a, b):
+    if not is_rigid(a, b):
         raise LoopError(
             "the ends of its six legs lie so that they hold the platform at no pose, as on similar"
             " hexagons"
@@ -440,12 +444,12 @@ def poses(a: Real, b: Real, length: Real) -> Poses:
     square = (length / size) ** 2
     c = np.sum(a0**2, axis=1) + np.sum(b0**2, axis=1) - square
     legs = PlatformLegs(a0.astype(complex), b0.astype(complex), c.astype(complex))
-    start = own_start(a0.tobytes(), b0.tobytes())
+    start = platform_start(a0.tobytes(), b0.tobytes())
     path, expected = Homotopy.between(start.legs, legs), len(start.x)
     for tolerance in (TOLERANCE, TOLERANCE / 10, TOLERANCE / 100):
         x, t = follow(path, start.x, tolerance)
         ends = certify(legs, x, t)
-        found = _real(a0, b0, square, ends, t)
+        found = _real_roots(a0, b0, square, ends, t)
         certain = int(np.sum(ends.regular))
         # a double root is the end of two paths
         complete = certain + 2 * found.folds == expected
@@ -477,7 +481,7 @@ def _slopes(a: Real, b: Real, e: Real, p: Real) -> tuple[Real, Real]:
     return np.sum(way**2, axis=2), np.concatenate([way, np.cross(arm, way)], axis=2)
 
 
-def _size(a: Real, b: Real) -> float:
+def _platform_size(a: Real, b: Real) -> float:
     """Return the root mean square distance of leg ends a, b (6, 3) from their means [m].
 
     1 if it is zero.
@@ -485,7 +489,7 @@ def _size(a: Real, b: Real) -> float:
     return float(np.sqrt(np.mean(np.var(a, axis=0)) + np.mean(np.var(b, axis=0)))) or 1.0
 
 
-def holds(a: Real, b: Real) -> bool:
+def is_rigid(a: Real, b: Real) -> bool:
     """Whether six legs determine the pose of the platform locally at a generic pose.
 
     False if the platform can move for constant leg lengths at every pose.
@@ -494,7 +498,7 @@ def holds(a: Real, b: Real) -> bool:
         a: (6, 3) ends of the legs on the ground [m].
         b: (6, 3) ends on the platform, in its frame [m].
     """
-    a, b = (a - a.mean(axis=0)) / _size(a, b), (b - b.mean(axis=0)) / _size(a, b)
+    a, b = (a - a.mean(axis=0)) / _platform_size(a, b), (b - b.mean(axis=0)) / _platform_size(a, b)
     rng = np.random.default_rng(_SEED)
     e = rng.normal(size=(_POSES, 4))
     e /= np.linalg.norm(e, axis=1, keepdims=True)
@@ -510,7 +514,7 @@ class _RealRoots(NamedTuple):
     folds: int
 
 
-def _real(a: Real, b: Real, square: Real, ends: PathEnds, t: Real) -> _RealRoots:
+def _real_roots(a: Real, b: Real, square: Real, ends: PathEnds, t: Real) -> _RealRoots:
     """Return the real roots among the ends of paths that reached t (r,).
 
     a, b (6, 3) are the leg ends, `square` (6,) the squared lengths, all in sizes of the platform.
@@ -528,7 +532,7 @@ def _real(a: Real, b: Real, square: Real, ends: PathEnds, t: Real) -> _RealRoots
     g = x[:, 4:] / np.linalg.norm(x[:, :4], axis=1, keepdims=True)
     # p = g e*: its vector part
     p = -g[:, :1] * e[:, 1:] + e[:, :1] * g[:, 1:] - np.cross(g[:, 1:], e[:, 1:])
-    e, p, error = _refined(a, b, square, e, p)
+    e, p, error = _refined_poses(a, b, square, e, p)
     kept = list[int]()
     for k in np.flatnonzero(error < _CLOSED):
         if not any(_is_same(e[k], p[k], e[other], p[other]) for other in kept):
@@ -543,7 +547,7 @@ def _is_same(e: Real, p: Real, other_e: Real, other_p: Real) -> bool:
     return bool(max(turn, np.max(np.abs(p - other_p))) < _SAME)
 
 
-def _refined(a: Real, b: Real, square: Real, e: Real, p: Real) -> tuple[Real, Real, Real]:
+def _refined_poses(a: Real, b: Real, square: Real, e: Real, p: Real) -> tuple[Real, Real, Real]:
     """Refine real poses by Newton's method; return e, p, and errors of squared lengths (r,).
 
     Steps without improvement are halved, because their length has no bound at a fold.
@@ -558,7 +562,7 @@ def _refined(a: Real, b: Real, square: Real, e: Real, p: Real) -> tuple[Real, Re
         step = -np.linalg.pinv(2 * J, rcond=_LOOSE) @ (value - square)[..., None]
         step = share[:, None] * step[..., 0]
         turn = np.concatenate([np.ones((len(e), 1)), step[:, 3:] / 2], axis=1)
-        tried = _products(turn, e)
+        tried = _hamilton_products(turn, e)
         tried /= np.linalg.norm(tried, axis=1, keepdims=True)
         place = p + step[:, :3]
         other, slope = _slopes(a, b, tried, place)
@@ -574,7 +578,7 @@ def _refined(a: Real, b: Real, square: Real, e: Real, p: Real) -> tuple[Real, Re
     return e, p, worst
 
 
-def _products(e: Real, other: Real) -> Real:
+def _hamilton_products(e: Real, other: Real) -> Real:
     """Return the Hamilton products (r, 4) of quaternions e and `other`."""
     scalar = e[:, :1] * other[:, :1] - np.sum(e[:, 1:] * other[:, 1:], axis=1, keepdims=True)
     vector = e[:, :1] * other[:, 1:] + other[:, :1] * e[:, 1:] + np.cross(e[:, 1:], other[:, 1:])

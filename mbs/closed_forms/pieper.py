@@ -164,9 +164,9 @@ def three_angle_steps(
     seen = casadi.mtimes([A, Z2, B])
     column = casadi.mtimes([Z1, seen]).T @ G[:, 0]
     return [
-        _middle(scene, middle, A[2, :].T, B[:, 2], G),
-        _outer(scene, first, seen[:2, 2], G[:2, 2]),
-        _outer(scene, last, SX(casadi.vertcat(1, 0)), column[:2]),
+        _middle_step(scene, middle, A[2, :].T, B[:, 2], G),
+        _outer_step(scene, first, seen[:2, 2], G[:2, 2]),
+        _outer_step(scene, last, SX(casadi.vertcat(1, 0)), column[:2]),
     ]
 
 
@@ -175,7 +175,7 @@ def _axis_rotation(scene: PieperLoop, k: int) -> SX:
     return SX(axis_rotation("z", scene.ring.joints[k].sign * scene.x(k)).matrix)
 
 
-def _middle(scene: PieperLoop, k: int, row: SX, column: SX, G: SX) -> SequenceStep:
+def _middle_step(scene: PieperLoop, k: int, row: SX, column: SX, G: SX) -> SequenceStep:
     """Return the step of joint k, the middle one of three, from row^T Z column = G_zz.
 
     Z is the rotation of the joint, G (3, 3) the rotation of the three joints.
@@ -210,7 +210,7 @@ def _square_angle(X: SX, Y: SX, Z: SX, sign: SX, G: SX) -> Root:
     return Root(SX(angle), SX(1), SX(1))
 
 
-def _outer(scene: PieperLoop, k: int, start: SX, end: SX) -> SequenceStep:
+def _outer_step(scene: PieperLoop, k: int, start: SX, end: SX) -> SequenceStep:
     """Return the step of joint k, which rotates the vector `start` (2, 1) onto `end` (2, 1)."""
     return angle_step(scene, k, (start, end), 1.0)
 
@@ -412,27 +412,27 @@ def three_joints(scene: PieperLoop, point: SX, p: SX) -> list[SequenceStep] | No
     joint, way = scene.ring.joints[2], scene.after(1).pose
     f = casadi.mtimes(way.R, moved_point(joint, point))
     f[:, 2] += way.p
-    square = _square(f, way.p, point) if joint.is_rotational else _slid_square(f)
+    square = _squared_form(f, way.p, point) if joint.is_rotational else _squared_prismatic_form(f)
     reach = PointTarget(scene, scene.after(0).pose, f, square, p)
     steps = (
         _second_revolute(reach) if scene.ring.joints[1].is_rotational else _second_prismatic(reach)
     )
-    return None if steps is None else [*steps, _first(reach)]
+    return None if steps is None else [*steps, _first_joint(reach)]
 
 
-def _square(f: SX, t: SX, point: SX) -> SX:
+def _squared_form(f: SX, t: SX, point: SX) -> SX:
     """Return the form (3, 1) of |f|^2 for a revolute joint 3, with f = t plus the rotated point."""
     middle = 2 * casadi.mtimes(f.T, t)
     return SX(middle + constant(casadi.sumsqr(point) - casadi.sumsqr(t)))
 
 
-def _slid_square(f: SX) -> SX:
+def _squared_prismatic_form(f: SX) -> SX:
     """Return the form (3, 1) of |f|^2 for a prismatic joint 3, from the forms f (3, 3)."""
     u, v = f[:, 1], f[:, 2]
     return casadi.vertcat(casadi.sumsqr(u), 2 * casadi.dot(u, v), casadi.sumsqr(v))
 
 
-def _rows(reach: PointTarget) -> tuple[list[SX], list[SX], list[SX]]:
+def _two_equations(reach: PointTarget) -> tuple[list[SX], list[SX], list[SX]]:
     """Return two equations a . (J2 f) = h that do not depend on joint 1.
 
     They are vectors a (3, 1), forms h (3, 1) in joint 3, and the typical sizes of h.
@@ -450,7 +450,7 @@ def _rows(reach: PointTarget) -> tuple[list[SX], list[SX], list[SX]]:
 def _second_revolute(reach: PointTarget) -> list[SequenceStep] | None:
     """Return the steps of joints 3 and 2 for a revolute joint 2; None if they are undetermined."""
     scene = reach.scene
-    (a, b), (h, k), (unit_h, unit_k) = _rows(reach)
+    (a, b), (h, k), (unit_h, unit_k) = _two_equations(reach)
     Z1, Z2 = h - a[2] * reach.f[2, :].T, k - b[2] * reach.f[2, :].T
     K = a[1] * b[0] - a[0] * b[1]
     unit_K = unit_h * unit_k / scene.length**2
@@ -500,10 +500,10 @@ def _parallel(
 
 def _second_prismatic(reach: PointTarget) -> list[SequenceStep] | None:
     """Return the steps of joints 3 and 2 for a prismatic joint 2; None if they are undetermined."""
-    rows, forms, _ = _rows(reach)
+    rows, forms, _ = _two_equations(reach)
     left = [h - casadi.mtimes(reach.f.T, a) for a, h in zip(rows, forms, strict=True)]
     if reach.scene.ring.joints[0].is_rotational:
-        return _slide_in_turn(reach, rows[0], rows[1][2], (left[0], left[1]))
+        return _revolute_then_prismatic(reach, rows[0], rows[1][2], (left[0], left[1]))
     return _two_displacements(reach, (rows[0][2], rows[1][2]), (left[0], left[1]))
 
 
@@ -520,7 +520,7 @@ def _two_displacements(
     return [third, linear(scene, 1, square, sign * value)]
 
 
-def _slide_in_turn(
+def _revolute_then_prismatic(
     reach: PointTarget, a: SX, along: SX, left: tuple[SX, SX]
 ) -> list[SequenceStep] | None:
     """Return the steps of joints 3 and 2 for a revolute joint 1 and a prismatic joint 2.
@@ -543,7 +543,7 @@ def _slide_in_turn(
     return [third, linear(scene, 1, along, sign * casadi.dot(left[1], b3))]
 
 
-def _first(reach: PointTarget) -> SequenceStep:
+def _first_joint(reach: PointTarget) -> SequenceStep:
     """Return the step of joint 1 once joints 2 and 3 are known."""
     scene = reach.scene
     f = Pose.translation(casadi.mtimes(reach.f, basis(scene, 2)))
@@ -606,7 +606,7 @@ def _displacements(scene: PieperLoop) -> SequenceStep:
     return step(
         scene.problem,
         "linear",
-        _text(scene, indices, ends),
+        _displacement_text(scene, indices, ends),
         {},
         Found(values, (), (determinant * determinant,), _named(M, path.p, ends)),
     )
@@ -626,7 +626,7 @@ def _named(M: SX, p: SX, ends: list[str]) -> dict[str, SX]:
     return named | {f"{axis}0": p[m] for m, axis in enumerate("XYZ")}
 
 
-def _text(scene: PieperLoop, indices: list[int], ends: list[str]) -> str:
+def _displacement_text(scene: PieperLoop, indices: list[int], ends: list[str]) -> str:
     """Return the three linear equations of the displacements as text.
 
     `indices` are those of the prismatic joints, `ends` the suffixes of their coefficients.
@@ -674,7 +674,7 @@ def pieper(problem: Problem) -> StepSequence:
     scenes = _arrangements(problem)
     if not scenes:
         raise NoClosedForm(_refusal(names))
-    found = [steps for scene in scenes if (steps := _steps(scene)) is not None]
+    found = [steps for scene in scenes if (steps := _concurrent_steps(scene)) is not None]
     regular = [steps for steps in found if _regular(problem, steps)]
     if not regular:
         raise NoClosedForm(_degenerate(scenes))
@@ -686,13 +686,16 @@ def _cost(sequence: StepSequence) -> tuple[int, int]:
     return sequence.branches, sum(step.kind == "quartic" for step in sequence.steps)
 
 
-def _steps(scene: PieperLoop) -> list[SequenceStep] | None:
+def _concurrent_steps(scene: PieperLoop) -> list[SequenceStep] | None:
     """Return the steps of a loop whose last three axes intersect.
 
     None if the position equations do not determine joints 1 to 3.
     """
     ring = scene.ring
-    first, last = _height(scene.after(3).pose)[0], _height(scene.after(4).pose.inverse())[0]
+    first, last = (
+        _common_normal(scene.after(3).pose)[0],
+        _common_normal(scene.after(4).pose.inverse())[0],
+    )
     point = (scene.after(2).pose @ Pose.translation(vector([0, 0, first]))).p
     target = (scene.after(5).inverse().pose @ Pose.translation(vector([0, 0, last]))).p
     steps = three_joints(scene, point, target)
@@ -746,7 +749,10 @@ def _concurrent(problem: Problem, length: SX) -> list[int]:
     """
     gaps, joints = problem.ring.gaps, problem.ring.joints
     after = [gaps[(k + 1) % _JOINTS].pose for k in range(_JOINTS)]
-    ahead, behind = [_height(way) for way in after], [_height(way.inverse()) for way in after]
+    ahead, behind = (
+        [_common_normal(way) for way in after],
+        [_common_normal(way.inverse()) for way in after],
+    )
     rows = []
     for k in range(_JOINTS):
         (_, along, miss, bend), (_, back, lost, turn) = ahead[k], behind[(k + 1) % _JOINTS]
@@ -760,7 +766,7 @@ def _concurrent(problem: Problem, length: SX) -> list[int]:
     return [k for k in (3, 0, 1, 2, 4, 5) if meet[k] and bent[k] and three[k]]
 
 
-def _height(way: Pose) -> tuple[SX, SX, SX, SX]:
+def _common_normal(way: Pose) -> tuple[SX, SX, SX, SX]:
     """Return the common normal of the z axis of a frame and the z axis of another, as coordinates.
 
     Args:

@@ -203,11 +203,11 @@ def _planar_branches(ring: Ring, prismatic: list[int], q: SX, p: SX) -> LoopBran
         revolute = next(k for k in range(3) if k not in prismatic)
         return two_prismatic(ring.rotated(revolute))
     ring = ring if has_spherical else with_elbow(ring, q)
-    pivot = _opposite(ring, q, p)
+    pivot = _parallelogram_axis(ring, q, p)
     return three_revolute(ring) if pivot is None else parallelogram(ring, pivot)
 
 
-def _opposite(ring: Ring, q: SX, p: SX) -> int | None:
+def _parallelogram_axis(ring: Ring, q: SX, p: SX) -> int | None:
     """Return the index of the known axis that makes the loop a parallelogram; None without one."""
     back = ring.gaps[0].pose.inverse()
     A, B = (square(in_plane(gap.pose.p)) for gap in ring.gaps[1:])

@@ -199,7 +199,7 @@ def _solve(loops: PlanarLoops) -> tuple[Real, Real, list[_Found]]:
         closed = int(np.all(np.abs(loops.constant) < _DEPENDENT))
         return np.zeros((closed, 0)), np.zeros((closed, 0)), []
     part = _smallest_part(loops)
-    own = _irreducible(_of_part(loops, part))
+    own = _irreducible(_part_rows(loops, part))
     parts, theta, s = [own], list[Real](), list[Real]()
     rest = (
         [k for k in range(n) if k not in part.angles],
@@ -260,7 +260,7 @@ def _rank(matrix: Complex) -> int:
     return int(np.sum(values > _SMALL))
 
 
-def _of_part(loops: PlanarLoops, part: PlanarPart) -> PlanarLoops:
+def _part_rows(loops: PlanarLoops, part: PlanarPart) -> PlanarLoops:
     """Return the rows of the unknowns of a part alone, with no more rows than it needs."""
     rows = part.rows
     columns = np.concatenate([loops.angles[:, part.angles], loops.slides[:, part.slides]], axis=1)
@@ -289,7 +289,7 @@ def _irreducible(loops: PlanarLoops) -> _Found:
         found = _dyad(loops)
     elif m == 0:
         found = dixon_roots(loops.angles, loops.constant)
-    elif n + m == 4 and _hidden(loops) is not None:
+    elif n + m == 4 and _best_triad(loops) is not None:
         found = triad_roots(loops)
     else:
         found = path_roots(loops)
@@ -657,19 +657,19 @@ def triad_roots(loops: PlanarLoops) -> _Found:
     """Return candidates for the unknowns of two loops with prismatic joints.
 
     Args:
-        loops: two closure rows in four unknowns, for which `_hidden` returns a triad.
+        loops: two closure rows in four unknowns, for which `_best_triad` returns a triad.
 
     Raises:
         LoopError: the polynomial vanishes for all directions.
     """
-    triad = _hidden(loops)
+    triad = _best_triad(loops)
     assert triad is not None  # tested by the caller
     angle, degree = triad.angles()
     theta, s = triad.unknowns(angle)
     return _Found(theta, s, f"the polynomial of a triad, of degree {degree}")
 
 
-def _hidden(loops: PlanarLoops) -> _Triad | None:
+def _best_triad(loops: PlanarLoops) -> _Triad | None:
     """Return the triad with a hidden direction that leaves three circles or lines, or None."""
     for hidden in range(loops.counts[0]):
         if all(k in (KNOWN, hidden) for k in loops.carriers):
@@ -903,7 +903,7 @@ def _random(rng: np.random.Generator, *shape: int) -> Complex:
 
 
 @functools.lru_cache(maxsize=16)
-def _start(links: bytes, count: int, carriers: tuple[int, ...]) -> tuple[_Rows, Complex]:
+def _random_start(links: bytes, count: int, carriers: tuple[int, ...]) -> tuple[_Rows, Complex]:
     """Return random rows and all their roots.
 
     Args:
@@ -946,7 +946,7 @@ def path_roots(loops: PlanarLoops) -> _Found:
     """
     n, _ = loops.counts
     links = np.abs(np.concatenate([loops.angles, loops.slides], axis=1)) > _SMALL
-    start, x = _start(links.tobytes(), len(links), tuple(int(k) for k in loops.carriers))
+    start, x = _random_start(links.tobytes(), len(links), tuple(int(k) for k in loops.carriers))
     rows = _Rows.of(loops)
     general = rows.with_constants(np.random.default_rng(_MONODROMY_SEED))
     y, t = start.followed(general, x)

@@ -96,12 +96,12 @@ def independent_indices(system: System) -> list[int]:
         link = next(link for link in system.tree.links if link.v.start <= k < link.v.stop)
         index = link.q.start if link.motion.nq == 1 else spins.get(link.q.start)
         if index is None or index in indices:
-            raise NoClosedForm(_unplaced(system, link))
+            raise NoClosedForm(_undetermined_text(system, link))
         indices.append(index)
     return indices
 
 
-def _unplaced(system: System, link: Link) -> str:
+def _undetermined_text(system: System, link: Link) -> str:
     """Return the error message for a quaternion that the independent positions do not determine."""
     return (
         f"{system.name}: the quaternion of {link.name} rotates freely, and the positions of"
@@ -135,7 +135,7 @@ def ring_of(system: System, number: int, known: Container[int], q: SX) -> Ring:
     a, b = (cut.link_a, cut.pose_a), (cut.link_b, cut.pose_b)
     builder.along_tree(system.tree, a, b, _spins(system))
     if not cut.welded:
-        _pass_cut(builder, system, number)
+        _append_cut_joint(builder, system, number)
     return builder.chain().ring()
 
 
@@ -145,7 +145,7 @@ def _spins(system: System) -> dict[int, Spin]:
     return {start: Spin(index, rest[start]) for start, index in spin_indices(system).items()}
 
 
-def _pass_cut(builder: ChainBuilder, system: System, number: int) -> None:
+def _append_cut_joint(builder: ChainBuilder, system: System, number: int) -> None:
     """Append the freedoms of cut joint `number` to the chain, from its frame_b to its frame_a."""
     joint = system.cuts[number].edge.joint
     spherical = ChainJoint(joint.name, Motion.SPHERICAL, None, -1, cut=True)
@@ -198,7 +198,10 @@ def gap_samples(ring: Ring, q: SX, p: SX) -> list[list[Matrix]]:
         q: symbols of positions, which are random in each sample.
         p: symbols of parameters, which are random in each sample.
     """
-    return [[np.array(DM(T)) for T in values] for values in _evaluate(_matrices(ring.gaps), q, p)]
+    return [
+        [np.array(DM(T)) for T in values]
+        for values in _values_at_samples(_matrices(ring.gaps), q, p)
+    ]
 
 
 def _matrices(gaps: Iterable[Gap]) -> list[SX]:
@@ -206,7 +209,7 @@ def _matrices(gaps: Iterable[Gap]) -> list[SX]:
     return [gap.pose.matrix for gap in gaps]
 
 
-def _evaluate(values: list[SX], q: SX, p: SX) -> list[list[DM]]:
+def _values_at_samples(values: list[SX], q: SX, p: SX) -> list[list[DM]]:
     """Return the values of expressions of q and p at three random positions and parameters."""
     rng = np.random.default_rng(_SURVEY_SEED)
     function = Function("samples", [q, p], values)
@@ -269,7 +272,7 @@ def always_zero(values: SX, q: SX, p: SX) -> bool:
         q: symbols of positions.
         p: symbols of parameters.
     """
-    samples = [np.array(value).ravel() for (value,) in _evaluate([values], q, p)]
+    samples = [np.array(value).ravel() for (value,) in _values_at_samples([values], q, p)]
     return all(bool(np.all(np.abs(sample) < _CLOSE)) for sample in samples)
 
 
@@ -281,7 +284,7 @@ def constants(values: SX, q: SX, p: SX) -> list[float | None]:
         q: symbols of positions on which an element may depend.
         p: symbols of parameters on which an element may depend.
     """
-    samples = np.array([np.array(value).ravel() for (value,) in _evaluate([values], q, p)])
+    samples = np.array([np.array(value).ravel() for (value,) in _values_at_samples([values], q, p)])
     same = np.all(np.abs(samples - samples[0]) < _CLOSE, axis=0)
     return [float(x) if fixed else None for x, fixed in zip(samples[0], same, strict=True)]
 
@@ -342,7 +345,9 @@ def is_planar(ring: Ring, samples: list[list[Matrix]]) -> bool:
     n = len(ring.joints)
     ends = range(start + 1, n) if spherical else range(start + 1, start + n + 1)
     return all(
-        _fits(ring.joints[k % n].motion, _normal(gaps, start, k)) for gaps in samples for k in ends
+        _fits_plane(ring.joints[k % n].motion, _normal(gaps, start, k))
+        for gaps in samples
+        for k in ends
     )
 
 
@@ -360,7 +365,7 @@ def _normal(gaps: list[Matrix], start: int, end: int) -> Matrix:
     return normal
 
 
-def _fits(motion: Motion, normal: Matrix) -> bool:
+def _fits_plane(motion: Motion, normal: Matrix) -> bool:
     """Whether a joint can move in a plane with this normal (3,) in the joint frame."""
     if motion is Motion.SPHERICAL:
         return True
@@ -435,7 +440,7 @@ def closed_samples(ring: Ring, given: SX, p: SX) -> list[Sample]:
         start = np.where(
             fixed, rng.uniform(*PARAMETERS, fixed.size), rng.uniform(*_POSITIONS, fixed.size)
         )
-        closed = _closed(function, start, fixed)
+        closed = _gauss_newton(function, start, fixed)
         if closed is not None:
             J = np.array(function(closed)[1])[:, :n]
             samples.append(Sample(closed[:n], closed[n:], rank(J, _LOOSE)))
@@ -445,7 +450,7 @@ def closed_samples(ring: Ring, given: SX, p: SX) -> list[Sample]:
     return samples
 
 
-def _closed(function: Function, start: Vector, fixed: NDArray[np.bool_]) -> Vector | None:
+def _gauss_newton(function: Function, start: Vector, fixed: NDArray[np.bool_]) -> Vector | None:
     """Return a closed configuration near `start` by Gauss-Newton; None if it does not converge.
 
     Elements of the mask `fixed` are kept.

@@ -197,37 +197,37 @@ class StepSequence:
 
     def leaf(self, given: SX, s: SX) -> Leaf:
         """Return the configuration for known quantities `given` and a vector s of all signs."""
-        leaf, first = self._start(), 0
+        leaf, first = self._empty_leaf(), 0
         for step in self.steps:
             chosen = s[first : first + len(step.signs)]
-            leaf, first = _take(leaf, step, given, chosen), first + len(step.signs)
-        return self._crop(leaf)
+            leaf, first = _after_step(leaf, step, given, chosen), first + len(step.signs)
+        return self._without_sums(leaf)
 
     def leaves(self, given: SX) -> list[Leaf]:
         """Return the configurations of all branches in order, with common steps computed once.
 
         `given` (m, 1) are the known quantities.
         """
-        leaves = [self._start()]
+        leaves = [self._empty_leaf()]
         for step in self.steps:
             choices = list(itertools.product((1, -1), repeat=len(step.signs)))
             leaves = [
-                _take(leaf, step, given, SX(casadi.DM(choice)))
+                _after_step(leaf, step, given, SX(casadi.DM(choice)))
                 for leaf in leaves
                 for choice in choices
             ]
-        return [self._crop(leaf) for leaf in leaves]
+        return [self._without_sums(leaf) for leaf in leaves]
 
-    def _start(self) -> Leaf:
+    def _empty_leaf(self) -> Leaf:
         """Return the empty configuration before the first step."""
         return Leaf(SX(2 * self.size, 1), SX(0, 1), SX(0, 1), {})
 
-    def _crop(self, leaf: Leaf) -> Leaf:
+    def _without_sums(self, leaf: Leaf) -> Leaf:
         """Return a configuration without the positions that are sums of joints."""
         return Leaf(leaf.x[: self.size], leaf.real, leaf.regular, leaf.coefficients)
 
 
-def _take(leaf: Leaf, step: SequenceStep, given: SX, s: SX) -> Leaf:
+def _after_step(leaf: Leaf, step: SequenceStep, given: SX, s: SX) -> Leaf:
     """Return the configuration after a further step with signs s."""
     values, real, regular, coefficients = step.function(leaf.x, given, s)
     x = SX(leaf.x)
@@ -363,7 +363,7 @@ def trigonometric_quartic(a: SX, signs: SX, scale: SX | float = 1.0) -> Root:
     size = casadi.sumsqr(a[:4])
     b = a / casadi.sqrt(casadi.sumsqr(a) + TINY_SQUARE)
     A = _symmetric((b[0] + b[4] / 3, b[1], b[2] / 2), (b[4] / 3 - b[0], b[3] / 2), 2 * b[4] / 3)
-    line, other, split = _line(A, _CIRCLE, signs[0])
+    line, other, split = _conic_line(A, _CIRCLE, signs[0])
     X, Y, Z = line[0], line[1], -line[2]
     square = X * X + Y * Y
     radicand = square - Z * Z
@@ -401,7 +401,7 @@ def real_quartic(
     size = casadi.sumsqr(scaled[:4])
     b = scaled / casadi.sqrt(casadi.sumsqr(scaled) + TINY_SQUARE)
     A = _symmetric((b[0], b[1] / 2, b[2] / 6), (2 * b[2] / 3, b[3] / 2), b[4])
-    line, other, split = _line(A, _PARABOLA, signs[0])
+    line, other, split = _conic_line(A, _PARABOLA, signs[0])
     radicand = line[1] * line[1] - 4 * line[0] * line[2]
     foot = (
         other[0] * (line[1] * line[1] - 2 * line[0] * line[2])
@@ -409,7 +409,7 @@ def real_quartic(
         + 2 * other[2] * line[0] * line[0]
     )
     sign = -signs[1] * _minus_sign(foot)
-    r = _quadratic(line, sign * casadi.sqrt(casadi.fmax(radicand, TINY_SQUARE)))
+    r = _quadratic_root(line, sign * casadi.sqrt(casadi.fmax(radicand, TINY_SQUARE)))
     for _ in range(_STEPS):
         r = r + _newton(*_quartic(b, r), _MOST_STEP * casadi.sqrt(1 + r * r))
     r = casadi.fmax(casadi.fmin(r, _FAR), -_FAR)
@@ -425,7 +425,7 @@ def _symmetric(row: tuple[SX, SX, SX], second: tuple[SX, SX], last: SX) -> SX:
     return casadi.reshape(casadi.vertcat(a, b, c, b, d, e, c, e, last), 3, 3)
 
 
-def _line(A: SX, curve: _Curve, sign: SX) -> tuple[SX, SX, SX]:
+def _conic_line(A: SX, curve: _Curve, sign: SX) -> tuple[SX, SX, SX]:
     """Return one line of the degenerate conic of A and `curve`, the other line, and the radicand.
 
     Args:
@@ -437,17 +437,17 @@ def _line(A: SX, curve: _Curve, sign: SX) -> tuple[SX, SX, SX]:
     M = _degenerate(A, curve)
     adjugate = _adjugate(M)
     sizes = [casadi.fabs(adjugate[k, k]) for k in range(3)]
-    column = _largest(sizes, [adjugate[:, k] for k in range(3)])
-    minor = -_largest(sizes, [adjugate[k, k] for k in range(3)])
+    column = _of_largest(sizes, [adjugate[:, k] for k in range(3)])
+    minor = -_of_largest(sizes, [adjugate[k, k] for k in range(3)])
     root = casadi.sqrt(casadi.fmax(minor, 0) + TINY_SQUARE)
     p = -column * root / (casadi.fabs(minor) + TINY_SQUARE)
     side = p[0] * curve.side[0] + p[1] * curve.side[1] + p[2] * curve.side[2]
     p = -sign * _minus_sign(side) * p
     N = M - casadi.skew(p)
     sums = [casadi.sumsqr(N[:, k]) for k in range(3)]
-    line = _largest(sums, [N[:, k] for k in range(3)])
+    line = _of_largest(sums, [N[:, k] for k in range(3)])
     weights = [casadi.fabs(line[k]) for k in range(3)]
-    other = _largest(weights, [N[k, :].T * -_minus_sign(line[k]) for k in range(3)])
+    other = _of_largest(weights, [N[k, :].T * -_minus_sign(line[k]) for k in range(3)])
     return SX(line), SX(other), SX(minor / (casadi.sumsqr(M) + TINY_SQUARE))
 
 
@@ -487,7 +487,7 @@ def _adjugate(M: SX) -> SX:
     return _symmetric((d * f - e * e, off[0], off[1]), (a * f - c * c, off[2]), a * d - b * b)
 
 
-def _largest(sizes: list[SX], values: list[SX]) -> SX:
+def _of_largest(sizes: list[SX], values: list[SX]) -> SX:
     """Return the element of `values` that belongs to the largest of three `sizes`."""
     late = casadi.if_else(sizes[2] > sizes[1], values[2], values[1])
     first = casadi.logic_and(sizes[0] >= sizes[1], sizes[0] >= sizes[2])
@@ -522,7 +522,7 @@ def _quartic(b: SX, r: SX) -> tuple[SX, SX]:
     return value / size, slope / size
 
 
-def _quadratic(line: SX, root: SX) -> SX:
+def _quadratic_root(line: SX, root: SX) -> SX:
     """Return (-b + root) / (2 a) for `line` = (a, b, c), without cancellation and bounded."""
     a, b, c = line[0], line[1], line[2]
     up, down = root - b, -b - root

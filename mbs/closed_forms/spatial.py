@@ -290,10 +290,10 @@ def spans(ring: Ring, q: SX, p: SX) -> Iterator[RigidLink]:
         for other in found:
             apart = not set(one.joints(n)) & set(other.joints(n))
             if apart and (one.first + one.count - other.first) % n == 0:
-                yield _span(ring.rotated(one.first), one, other)
+                yield _rigid_link(ring.rotated(one.first), one, other)
 
 
-def _span(begun: Ring, one: Centre, other: Centre) -> RigidLink:
+def _rigid_link(begun: Ring, one: Centre, other: Centre) -> RigidLink:
     """Return rigid link from the centre `one`, at which the loop begins, to the next, `other`."""
     link = begun.gaps[one.count].pose
     after = one.count + other.count
@@ -315,14 +315,14 @@ def at_distance(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     """
     for span in spans(ring, q, p):
         if len(span.chain.joints) == 1:
-            m, d = _ends(span)
+            m, d = _link_ends(span)
             idle = any(always_zero(in_plane(end), q, p) for end in (m, d))
             if not (idle and span.chain.joints[0].is_rotational):
                 return _at_distance(span.chain.joints[0], m, d, span.squared)
     return None
 
 
-def _ends(span: RigidLink) -> tuple[SX, SX]:
+def _link_ends(span: RigidLink) -> tuple[SX, SX]:
     """Return the ends of a link relative to the single other joint of its loop.
 
     These are the end in the frame before the joint, negated, and the start in the frame after it.
@@ -582,13 +582,13 @@ def _rod_branches(ring: Ring, joint: ChainJoint, q: SX) -> LoopBranches:
     assert joint.spin is not None
     assert joint.index is not None
     rest = SX(casadi.DM(list(joint.spin.rest)))
-    shortest = _product(_shortest_rotation(quaternion_rotation(rest) @ u, w), rest)
+    shortest = _quaternion_product(_shortest_rotation(quaternion_rotation(rest) @ u, w), rest)
     half = q[joint.spin.index] / 2
-    rotated = _product(shortest, casadi.vertcat(casadi.cos(half), casadi.sin(half) * u))
+    rotated = _quaternion_product(shortest, casadi.vertcat(casadi.cos(half), casadi.sin(half) * u))
     rotated = casadi.if_else(rotated[0] < 0, -rotated, rotated)
     path = {joint.index + k: rotated[k] for k in range(4)}
     given = q[joint.index : joint.index + 4]
-    left = _product(casadi.vertcat(shortest[0], -shortest[1:4]), given)
+    left = _quaternion_product(casadi.vertcat(shortest[0], -shortest[1:4]), given)
     angle = 2 * casadi.atan2(casadi.dot(u, left[1:4]), left[0])
     return LoopBranches({"": path}, RodSpin(joint.spin.index, SX(angle)))
 
@@ -599,7 +599,7 @@ def _shortest_rotation(a: SX, b: SX) -> SX:
     return SX(whole / casadi.norm_2(whole))
 
 
-def _product(a: SX, b: SX) -> SX:
+def _quaternion_product(a: SX, b: SX) -> SX:
     """Return the product of two quaternions w, x, y, z."""
     vector = a[0] * b[1:4] + b[0] * a[1:4] + cross(a[1:4], b[1:4])
     return casadi.vertcat(a[0] * b[0] - casadi.dot(a[1:4], b[1:4]), vector)
@@ -687,7 +687,7 @@ def point_on_links(name: str, spans: Sequence[RigidLink]) -> LoopBranches:
     indices = sorted(prismatic_indices(spans[0]) or ())
     spheres = [_sphere(span, indices) for span in spans]
     first = spheres[0]
-    base, along = _line(spheres)
+    base, along = _sphere_line(spheres)
     A, B = casadi.bilin(first.M, along, along), casadi.dot(along, first.M @ base + first.c)
     C = casadi.bilin(first.M, base, base) + 2 * casadi.dot(first.c, base) + first.k
     root = casadi.sqrt(B * B - A * C)
@@ -710,7 +710,7 @@ def _sphere(span: RigidLink, indices: Sequence[int]) -> _Sphere:
     return _Sphere(U.T @ U, U.T @ e, casadi.sumsqr(e) - span.squared)
 
 
-def _line(spheres: Sequence[_Sphere]) -> tuple[SX, SX]:
+def _sphere_line(spheres: Sequence[_Sphere]) -> tuple[SX, SX]:
     """Return a point and the direction of the line in which the planes of the spheres intersect."""
     first, *others = spheres
     a = [other.c - first.c for other in others]
@@ -756,7 +756,7 @@ def bennett(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
         begun = ring.rotated(first)
         known = begun.gaps[0].pivots
         if len(known) == 1 and not any(gap.pivots for gap in begun.gaps[1:]):
-            branches = _closing(begun, known[0], q, p)
+            branches = _closing_angles(begun, known[0], q, p)
             if len(branches) == 1:
                 return LoopBranches(
                     {"": positions(ring.rotated(first).joints, [t.value for t in branches[0]])}
@@ -764,7 +764,7 @@ def bennett(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     return None
 
 
-def _closing(ring: Ring, known: Pose, q: SX, p: SX) -> list[list[Angle]]:
+def _closing_angles(ring: Ring, known: Pose, q: SX, p: SX) -> list[list[Angle]]:
     """Return the angles of each half rotation that closes the loop at all known positions.
 
     `known` is the pose of the known joint in the frame of its transform.

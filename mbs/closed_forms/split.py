@@ -51,7 +51,7 @@ def split(ring: Ring, q: SX, p: SX) -> LoopBranches | str:
         sequence = paul(problem)
     except NoClosedForm as error:
         return str(error)
-    return _root(simple, problem, sequence)
+    return _branches_of(simple, problem, sequence)
 
 
 def _without_spherical(ring: Ring) -> Ring:
@@ -89,18 +89,18 @@ def _problem(ring: Ring, q: SX, p: SX) -> Problem | str:
     return Problem(own, x, given, [(sample.x, sample.given) for sample in samples])
 
 
-def _root(ring: Ring, problem: Problem, sequence: StepSequence) -> LoopBranches:
+def _branches_of(ring: Ring, problem: Problem, sequence: StepSequence) -> LoopBranches:
     """Return the branches of a loop from the sequence of steps that solves `problem`."""
     indices = {k: joint.index for k, joint in enumerate(ring.joints) if joint.index is not None}
-    needed = _up_to(sequence, set(indices))
+    needed = _first_steps(sequence, set(indices))
     branches = dict[str, dict[int, SX]]()
     for branch, leaf in enumerate(needed.leaves(problem.given)):
-        x = _where_real(leaf)
+        x = _nan_unless_real(leaf)
         branches[needed.label(branch)] = {index: SX(x[k]) for k, index in indices.items()}
     return LoopBranches(branches)
 
 
-def _up_to(sequence: StepSequence, target: set[int]) -> StepSequence:
+def _first_steps(sequence: StepSequence, target: set[int]) -> StepSequence:
     """Return the first steps of a sequence that solve the joints with indices `target`."""
     steps = list[SequenceStep]()
     for step in sequence.steps:
@@ -110,7 +110,7 @@ def _up_to(sequence: StepSequence, target: set[int]) -> StepSequence:
     return replace(sequence, steps=tuple(steps))
 
 
-def _where_real(leaf: Leaf) -> SX:
+def _nan_unless_real(leaf: Leaf) -> SX:
     """Return the positions (n, 1) of a branch; NaN if a radicand is negative."""
     real = leaf.real
     if real.numel() == 0:

@@ -83,12 +83,14 @@ def with_parameters(system: System, columns: Sequence[Column], values: SX) -> Sy
     for column, value in zip(columns, elements(values), strict=True):
         if not column.other:
             given.setdefault(column.link - 1, {})[column.kind] = value
-    links = tuple(_with(link, given.get(j, {})) for j, link in enumerate(system.tree.links))
+    links = tuple(
+        _link_with_values(link, given.get(j, {})) for j, link in enumerate(system.tree.links)
+    )
     bodies = tuple(replace(row, mass=None) for row in system.bodies)
     return replace(system, tree=replace(system.tree, links=links), bodies=bodies, _cache={})
 
 
-def _with(link: Link, values: Mapping[str, SX]) -> Link:
+def _link_with_values(link: Link, values: Mapping[str, SX]) -> Link:
     """Return a copy of `link` with the parameters in `values` replaced.
 
     Keys of `values` are kinds of parameters, such as "XX", "M", "Jm" or "Fv".
@@ -159,12 +161,12 @@ def with_constants(system: System, names: Sequence[str]) -> System:
             values[parameter.name] = parameter.default
     rest = [k for k, parameter in enumerate(system.parameters) if parameter.name not in values]
     parameters = tuple(system.parameters[k] for k in rest)
-    changed: System = _changer(system.symbol_table, values)(replace(system, _cache={}))
+    changed: System = _substitution(system.symbol_table, values)(replace(system, _cache={}))
     bounds = {name: own for name, own in system.bounds.items() if name not in values}
     return replace(changed, parameters=parameters, p=system.p[rest], bounds=bounds, _cache={})
 
 
-def _changer(symbols: Mapping[str, SX], values: Mapping[str, float]) -> Callable[[Any], Any]:
+def _substitution(symbols: Mapping[str, SX], values: Mapping[str, float]) -> Callable[[Any], Any]:
     """Return a function that substitutes numbers for symbols in any value of a system.
 
     It descends into tuples, lists, dicts and dataclasses. `symbols` maps names to SX symbols,
@@ -302,7 +304,7 @@ def grouped_by_rules(
         structure: structure of the tree.
     """
     indices = _column_indices(columns)
-    grouping = _by_tree(structure, Grouping.none(len(columns)), indices)
+    grouping = _after_tree_rules(structure, Grouping.none(len(columns)), indices)
     sampled = sampler(system)
     if not system.is_closed:
         return without_zeros(grouping, sampled)
@@ -312,20 +314,22 @@ def grouped_by_rules(
         *turning_relations(system, configurations, base_moves=structure.base_moves),
     ]
     for relation in relations:
-        terms = _terms(relation, indices)
+        terms = _by_column_index(relation, indices)
         if terms is not None:
             grouping = related(grouping, terms, lambda k: columns[k].link, sampled)
     return without_zeros(grouping, sampled)
 
 
-def _by_tree(structure: Structure, grouping: Grouping, indices: Mapping[Key, int]) -> Grouping:
+def _after_tree_rules(
+    structure: Structure, grouping: Grouping, indices: Mapping[Key, int]
+) -> Grouping:
     """Return `grouping` after the symbolic rules for trees.
 
     `indices` maps (link index, kind) to the column index. A rule is skipped if one of its
     parameters has no column.
     """
     for removal in tree_rules(structure):
-        dropped, terms = indices.get(removal.parameter), _terms(removal.effects, indices)
+        dropped, terms = indices.get(removal.parameter), _by_column_index(removal.effects, indices)
         if dropped is not None and terms is not None and dropped in grouping.columns[dropped]:
             grouping = grouping.replaced(dropped, terms)
     return grouping
@@ -339,7 +343,7 @@ def _column_indices(columns: Sequence[Column]) -> dict[Key, int]:
     return {(c.link - 1, c.kind): k for k, c in enumerate(columns) if not c.other}
 
 
-def _terms(effects: Mapping[Key, SX], indices: Mapping[Key, int]) -> Terms | None:
+def _by_column_index(effects: Mapping[Key, SX], indices: Mapping[Key, int]) -> Terms | None:
     """Return the linear combination `effects` with column indices as keys.
 
     `indices` maps (link index, kind) to the column index. None if a parameter has no column.
@@ -385,7 +389,7 @@ class BaseParameters:
     matrix: NDArray[np.float64]
     function: Function
     check: Check
-    _terms: tuple[Mapping[str, SX], ...]
+    _by_column_index: tuple[Mapping[str, SX], ...]
 
     def __repr__(self) -> str:
         return f"<BaseParameters {self.system.name}: {self.count} of {len(self.columns)}>"
@@ -406,7 +410,7 @@ class BaseParameters:
 
         The suffix R, as in "XX2R", marks parameters that contain other parameters.
         """
-        pairs = zip(self.kept, self._terms, strict=True)
+        pairs = zip(self.kept, self._by_column_index, strict=True)
         return tuple(f"{c.name}R" if len(terms) > 1 else c.name for c, terms in pairs)
 
     @property
@@ -417,12 +421,12 @@ class BaseParameters:
     @property
     def equations(self) -> tuple[str, ...]:
         """Equation of each base parameter, such as "XX2R = XX2 - YY2 + 0.25*M3"."""
-        return tuple(map(equation, self.names, self._terms))
+        return tuple(map(equation, self.names, self._by_column_index))
 
     @property
     def without_effect(self) -> tuple[Column, ...]:
         """Eliminated parameters that occur in no base parameter: no effort depends on them."""
-        used = {name for terms in self._terms for name in terms}
+        used = {name for terms in self._by_column_index for name in terms}
         return tuple(column for column in self.eliminated if column.name not in used)
 
     def text(self) -> str:
@@ -437,7 +441,7 @@ class BaseParameters:
             f"Grouped with others: {', '.join(grouped) or 'none'}",
             *(
                 text
-                for text, terms in zip(self.equations, self._terms, strict=True)
+                for text, terms in zip(self.equations, self._by_column_index, strict=True)
                 if len(terms) > 1
             ),
             self.check.text,
@@ -497,7 +501,7 @@ def base_parameters(
     require_system(system)
     _check_method(system, method, order)
     chosen = chosen_columns(system, columns, {})
-    first = _first(system, chosen, order or ())
+    first = _priority_indices(system, chosen, order or ())
     preference = preferred_order(chosen, first)
     deciding = deciding_symbols(system, chosen, base_moves=moving_base)
     if method == "numeric":
@@ -508,7 +512,9 @@ def base_parameters(
     )
     if method == "numeric":
         grouping, check = grouped_by_rank(sample, preference)
-        return _result(system, method, chosen, grouping, _at_constants(check, deciding))
+        return _base_parameters_of(
+            system, method, chosen, grouping, _noting_constants(check, deciding)
+        )
     structure = structure_of(system, base_moves=moving_base)
     found = _by_rules(system, sample, structure, preference, seed, symbolic=bool(deciding))
     if found is None:
@@ -519,10 +525,10 @@ def base_parameters(
         return replace(
             numeric, method=method, check=replace(numeric.check, agrees=False, text=told)
         )
-    return _result(system, method, chosen, *found)
+    return _base_parameters_of(system, method, chosen, *found)
 
 
-def _at_constants(check: Check, names: Sequence[str]) -> Check:
+def _noting_constants(check: Check, names: Sequence[str]) -> Check:
     """Return `check` with a note that the grouping holds only at the defaults of the `names`."""
     if not names:
         return check
@@ -552,10 +558,10 @@ def _by_rules(
     if check.agrees and symbolic and not system.is_closed:
         doubt = checked_elsewhere(system, sample.columns, grouping, order, structure)
         return grouping, doubt or check
-    return _complete(sample, grouping, check, order, symbolic=symbolic)
+    return _completed_numerically(sample, grouping, check, order, symbolic=symbolic)
 
 
-def _complete(
+def _completed_numerically(
     sample: RegressorSample,
     grouping: Grouping,
     check: Check,
@@ -593,7 +599,7 @@ def _configurations(system: System, seed: int, *, symbolic: bool) -> list[Closed
     return [ClosedConfigurations(closed_positions(system, p, count, seed + 1), p) for p in values]
 
 
-def _result(
+def _base_parameters_of(
     system: System, method: str, columns: tuple[Column, ...], grouping: Grouping, check: Check
 ) -> BaseParameters:
     """Return the `BaseParameters` of a grouping, with matrix, expressions and CasADi function."""
@@ -620,7 +626,7 @@ def _result(
         matrix=numbers_at(system, columns, grouping, default_parameters(system)),
         function=ModelFunction(function, system),
         check=check,
-        _terms=tuple(terms[k] for k in kept),
+        _by_column_index=tuple(terms[k] for k in kept),
     )
 
 
@@ -635,7 +641,7 @@ def _check_method(system: System, method: str, order: Sequence[str] | None) -> N
         )
 
 
-def _first(system: System, columns: Sequence[Column], order: Sequence[str]) -> list[int]:
+def _priority_indices(system: System, columns: Sequence[Column], order: Sequence[str]) -> list[int]:
     """Return the column indices of the parameters named in `order`, which are kept with priority.
 
     Raises ModelError for an unknown name.

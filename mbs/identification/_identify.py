@@ -75,18 +75,18 @@ def report(estimate: Estimate, *tests: tuple[str, Residuals]) -> str:
         f"Identification by {estimate.method}: {len(estimate.names)} parameters from"
         f" {rows} instants of {m} efforts, {span:.4g} s",
         "",
-        *_parameters(estimate),
+        *_parameter_lines(estimate),
         "",
-        *_residuals("Errors", estimate.residuals),
+        *_residual_lines("Errors", estimate.residuals),
     ]
     for title, residuals in tests:
-        lines += ["", *_residuals(f"Errors, {title}", residuals)]
+        lines += ["", *_residual_lines(f"Errors, {title}", residuals)]
     remarks = [
-        *_fit(estimate.residuals),
-        *_drop(observations),
-        *_excitation(estimate),
-        *_consistency(estimate),
-        *_signs(estimate),
+        *_misfit_remark(estimate.residuals),
+        *_dropped_remark(observations),
+        *_excitation_remark(estimate),
+        *_consistency_remark(estimate),
+        *_sign_remark(estimate),
     ]
     return "\n".join([*lines, "", *remarks])
 
@@ -116,7 +116,7 @@ def identification_report(
     return "\n".join([report(estimate, *tests), "", *lines, "", told])
 
 
-def _parameters(estimate: Estimate) -> list[str]:
+def _parameter_lines(estimate: Estimate) -> list[str]:
     """Return the lines of the table of parameters: name, value and standard deviation."""
     lines = [f"{'parameter':<12}{'value':>12}{'deviation':>12}{'%':>9}  unit"]
     rows = zip(
@@ -131,7 +131,7 @@ def _parameters(estimate: Estimate) -> list[str]:
     return lines
 
 
-def _residuals(title: str, residuals: Residuals) -> list[str]:
+def _residual_lines(title: str, residuals: Residuals) -> list[str]:
     """Return the lines of a table of residuals: percentage, rms and independent rows per effort.
 
     `title` is printed in its first line.
@@ -154,7 +154,7 @@ def _residuals(title: str, residuals: Residuals) -> list[str]:
     ]
 
 
-def _fit(residuals: Residuals) -> list[str]:
+def _misfit_remark(residuals: Residuals) -> list[str]:
     """Return a remark as a list of one line if the residuals are too large to be noise, else []."""
     if not residuals.total_percent > _UNFIT:
         return []
@@ -164,7 +164,7 @@ def _fit(residuals: Residuals) -> list[str]:
     ]
 
 
-def _drop(observations: Observations) -> list[str]:
+def _dropped_remark(observations: Observations) -> list[str]:
     """Return a remark on the instants near singular configurations that were left out, or []."""
     if not observations.dropped:
         return []
@@ -175,7 +175,7 @@ def _drop(observations: Observations) -> list[str]:
     ]
 
 
-def _excitation(estimate: Estimate) -> list[str]:
+def _excitation_remark(estimate: Estimate) -> list[str]:
     """Return a remark on the condition number, or on parameters that are not identifiable.
 
     [] for a full parameter set, which is never fully identifiable.
@@ -191,7 +191,7 @@ def _excitation(estimate: Estimate) -> list[str]:
     ]
 
 
-def _consistency(estimate: Estimate) -> list[str]:
+def _consistency_remark(estimate: Estimate) -> list[str]:
     """Return a remark whether each link has a positive definite pseudo-inertia.
 
     [] unless all ten inertial parameters of every link are estimated.
@@ -212,7 +212,7 @@ def _is_full(estimate: Estimate) -> bool:
     return len(inertial) == len(INERTIAL) * len({c.link for c in inertial}) > 0
 
 
-def _signs(estimate: Estimate) -> list[str]:
+def _sign_remark(estimate: Estimate) -> list[str]:
     """Return a remark on friction or rotor inertias that are significantly negative, or []."""
     rows = zip(estimate.columns, estimate.values, estimate.deviations, strict=True)
     kinds = ("Ia", "Iam", "Jm", "Fv", "Fvm", "Fs", "Fsm")
@@ -363,8 +363,8 @@ def identify(
         ModelError: the method is unknown, or a base parameter is not identifiable from the record.
         SolverError: the estimation of the base parameters did not converge.
     """
-    _check(system, method, equations, smoothing)
-    records = _records(system, record, bandwidth)
+    _check_choices(system, method, equations, smoothing)
+    records = _record_tuple(system, record, bandwidth)
     known, options = prior or Prior(), _options(rotors, offsets, couplings)
     with progress(f"{system.name}: identification", 0.0, 1.0, quiet=quiet) as reached:
         D = regressor(system, **options)
@@ -375,7 +375,7 @@ def identify(
         grouped = full.grouped(base)
         reached(_EQUATIONS_DONE)
         physical = physically_consistent if method == "least_squares" else consistent_weighted
-        watch = partial(_between, reached, _EQUATIONS_DONE, _BODIES_DONE)
+        watch = partial(_partial_progress, reached, _EQUATIONS_DONE, _BODIES_DONE)
         bodies, reason = _found_bodies(partial(physical, full, known, watch), method)
         reached(_BODIES_DONE)
         estimator = METHODS[method](Setting(D, base, samples, full, bodies, known))
@@ -400,12 +400,14 @@ def _found_bodies(search: Callable[[], Estimate], method: str) -> tuple[Estimate
         return None, str(error)
 
 
-def _between(reached: Callable[[float], None], first: float, last: float, part: float) -> None:
+def _partial_progress(
+    reached: Callable[[float], None], first: float, last: float, part: float
+) -> None:
     """Call `reached` with the progress between `first` and `last` at fraction `part` (0 to 1)."""
     reached(first + part * (last - first))
 
 
-def _records(
+def _record_tuple(
     system: System, record: Record | Sequence[Record], bandwidth: float
 ) -> tuple[Record, ...]:
     """Return one record or a list of records as a tuple.
@@ -433,7 +435,7 @@ def _options(rotors: bool, offsets: bool, couplings: Sequence[Joints]) -> dict[s
     return {"rotors": rotors, "offsets": offsets, "couplings": couplings}
 
 
-def _check(system: System, method: str, equations: str, smoothing: object) -> None:
+def _check_choices(system: System, method: str, equations: str, smoothing: object) -> None:
     """Raise ModelError if the method, the equations or the smoothing function is unknown."""
     require_system(system)
     if not callable(smoothing):

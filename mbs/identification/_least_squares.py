@@ -16,9 +16,14 @@ from mbs.identification.leading import (
     active_indices,
     configuration_of,
     is_explicit,
-    of_motion,
+    motion_function,
 )
-from mbs.identification.observations import Observations, known_of, motion_of, require_visible
+from mbs.identification.observations import (
+    Observations,
+    known_efforts_at,
+    motion_of,
+    require_visible,
+)
 from mbs.identification.record import Samples
 from mbs.identification.triangle import triangle, triangle_solved
 
@@ -290,8 +295,10 @@ def huber(
     equations, values = EffortEquations.of(observations), start.values
     for number in range(1, most + 1):
         error = observations.y - observations.W @ values
-        scale = _deviations(error, observations.y)
-        following = _solved(observations, np.sqrt(_trust(error / scale, bound)) / scale)
+        scale = _median_deviations(error, observations.y)
+        following = _row_weighted_solution(
+            observations, np.sqrt(_huber_weights(error / scale, bound)) / scale
+        )
         change = np.abs(following - values) / start.deviations
         values = following
         if change.max() < tolerance:
@@ -306,7 +313,7 @@ def huber(
     )
 
 
-def _trust(size: Array, bound: float) -> Array:
+def _huber_weights(size: Array, bound: float) -> Array:
     """Return the Huber weight (n, m) of each error: 1 up to `bound`, then bound/|size|.
 
     `size` (n, m) are errors in standard deviations.
@@ -314,7 +321,7 @@ def _trust(size: Array, bound: float) -> Array:
     return np.asarray(bound / np.maximum(np.abs(size), bound), dtype=float)
 
 
-def _solved(observations: Observations, rows: Array) -> Array:
+def _row_weighted_solution(observations: Observations, rows: Array) -> Array:
     """Return the least-squares parameters (k,) with weights `rows` (n, m) of single equations."""
     W, y = observations.rows
     w = rows.reshape(-1)
@@ -330,9 +337,9 @@ def _robust_covariance(
     Source: Huber 1964 (variance of the estimator); Street, Carroll & Ruppert 1988.
     """
     error = observations.y - observations.W @ values
-    scale = _deviations(error, observations.y)
+    scale = _median_deviations(error, observations.y)
     trusted = np.mean(np.abs(error) < bound * scale, axis=0)
-    kept = error * _trust(error / scale, bound)
+    kept = error * _huber_weights(error / scale, bound)
     weights = np.sqrt(trusted) / scale
     fit = equations.solved(weights)
     left = np.maximum(len(error) - fit.own, 1.0)
@@ -340,7 +347,7 @@ def _robust_covariance(
     return equations.with_errors(kept).covariance(fit, weights, deviations)
 
 
-def _deviations(error: Array, efforts: Array) -> Array:
+def _median_deviations(error: Array, efforts: Array) -> Array:
     """Return a standard deviation (m,) of each column of `error` (n, m) from its median magnitude.
 
     It is at least the rounding error of the `efforts` (n, m).
@@ -460,9 +467,9 @@ def simulated_motion(
         )
     q, v, _ = motion_of(regressor, samples)
     q_a = q[:, active_indices(regressor.system)]
-    acceleration = _acceleration(regressor, K, 2 * np.pi * follow)
+    acceleration = _tracked_acceleration(regressor, K, 2 * np.pi * follow)
     step = _runge_kutta(acceleration, 1.0 / samples.rate)
-    inputs = np.hstack([q_a, v, samples.tau - known_of(regressor, samples)]).T
+    inputs = np.hstack([q_a, v, samples.tau - known_efforts_at(regressor, samples)]).T
     m, count = q_a.shape[1], inputs.shape[1] - 1
     start = np.concatenate([q_a[0], v[0]])
     states = step.mapaccum(count)(DM(start), inputs[:, :-1], inputs[:, 1:]).full()
@@ -476,13 +483,13 @@ def simulated_motion(
     return replace(samples, q=states[:m].T, v=states[m:].T, a=a.T)
 
 
-def _acceleration(regressor: Any, K: Array, w: float) -> Function:
+def _tracked_acceleration(regressor: Any, K: Array, w: float) -> Function:
     """Return the Function (state, given) -> a (m, 1) of the robot with a tracking controller.
 
     state is (q, v); given is (q_m, v_m, tau): measured motion and efforts. K (k,) are the
     parameters, `w` is the bandwidth of the controller [rad/s].
     """
-    m, kind = int(regressor.size1_in(1)), _kind(regressor)
+    m, kind = int(regressor.size1_in(1)), _symbol_class(regressor)
     state, given, a = kind.sym("state", 2 * m), kind.sym("given", 3 * m), kind.sym("a", m)
     q, v = state[:m], state[m:]
     q_m, v_m, tau = given[:m], given[m : 2 * m], given[2 * m :]
@@ -500,12 +507,12 @@ def _efforts(regressor: Any, K: Array) -> Function:
     """Return the Function (q_a, v_a, a_a) -> D K: efforts (m, 1) for the parameters K (k,)."""
     m = int(regressor.size1_in(1))
     q, v, a = (MX.sym(name, m) for name in "qva")
-    D = of_motion(regressor)(configuration_of(regressor.system, q), v, a)
+    D = motion_function(regressor)(configuration_of(regressor.system, q), v, a)
     function = Function("efforts", [q, v, a], [casadi.mtimes(D, DM(K))])
     return function.expand() if is_explicit(regressor.system) else function
 
 
-def _kind(regressor: Any) -> Any:
+def _symbol_class(regressor: Any) -> Any:
     """Return the CasADi symbol class: SX if the loops close without iteration, otherwise MX."""
     return SX if is_explicit(regressor.system) else MX
 

@@ -185,7 +185,9 @@ def pseudo_inertias(columns: Sequence[Column], values: Array) -> dict[int, Array
     found = {}
     for link in whole_links(columns):
         ten = SX(DM([float(values[at[kind, link]]) for kind in INERTIAL]))
-        found[link] = _numbers(_matrix(PseudoInertia.of(Inertia.from_parameters(ten))))
+        found[link] = _constant_array(
+            _body_pseudo_inertia(PseudoInertia.of(Inertia.from_parameters(ten)))
+        )
     return found
 
 
@@ -205,7 +207,7 @@ def consistent_links(columns: Sequence[Column], values: Array) -> list[int]:
     return [link for link, P in pairs if np.linalg.eigvalsh(P)[0] > 0]
 
 
-def likeliest(
+def penalised_minimum(
     misfit: Misfit, columns: Sequence[Column], prior: Prior, watch: Watch | None = None
 ) -> tuple[Array, Array]:
     """Return the parameters that minimise the misfit plus the weighted divergence from the guess.
@@ -257,7 +259,7 @@ class _PhysicalProblem:
         if self.prior.total_mass is not None:
             masses = casadi.vertcat(masses, casadi.sum1(masses))
         programme = {"x": variables, "f": cost, "g": masses}
-        return _numbers(at(self._minimum(programme, own, watch)))[:, 0]
+        return _constant_array(at(self._minimum(programme, own, watch)))[:, 0]
 
     def _minimum(self, programme: dict[str, SX], own: list[Column], watch: Watch | None) -> DM:
         """Solve `programme` with IPOPT and return its variables; raise SolverError if it fails.
@@ -298,7 +300,7 @@ class _PhysicalProblem:
 
         Its pseudo-inertia is C L L' C', with C the root of the guess.
         """
-        root = casadi.mtimes(DM(self.roots[link]), _triangle(x))
+        root = casadi.mtimes(DM(self.roots[link]), _cholesky_factor(x))
         P = casadi.mtimes(root, root.T)
         return PseudoInertia(P[:3, :3], P[:3, 3], P[3, 3]).inertia().parameters
 
@@ -314,7 +316,7 @@ class _PhysicalProblem:
         return casadi.vertcat(*every)
 
 
-def _triangle(x: SX) -> SX:
+def _cholesky_factor(x: SX) -> SX:
     """Return the lower triangular factor L (4, 4) of log-Cholesky variables x (10, 1).
 
     They are the logarithms of its diagonal, then the elements below it, row by row.
@@ -333,7 +335,7 @@ def _divergence(x: SX) -> SX:
     With log-Cholesky variables x (10, 1), it is tr(P0^-1 P) - log det(P0^-1 P) - 4, zero for P =
     P0.
     """
-    return casadi.sumsqr(_triangle(x)) - 2 * casadi.sum1(x[:4]) - 4
+    return casadi.sumsqr(_cholesky_factor(x)) - 2 * casadi.sum1(x[:4]) - 4
 
 
 def _guessed_roots(columns: Sequence[Column], guess: npt.ArrayLike | None) -> dict[int, Array]:
@@ -372,7 +374,7 @@ def _covariance(misfit: Misfit, columns: Sequence[Column], values: Array, emphas
     for link, P in pseudo_inertias(columns, values).items():
         inverse = np.linalg.inv(P)
         indices = [at[kind, link] for kind in INERTIAL]
-        units = [inverse @ _unit(k) for k in range(10)]
+        units = [inverse @ _pseudo_inertia_unit(k) for k in range(10)]
         H[np.ix_(indices, indices)] += emphasis * np.array(
             [[np.trace(X @ Y) for Y in units] for X in units]
         )
@@ -381,22 +383,22 @@ def _covariance(misfit: Misfit, columns: Sequence[Column], values: Array, emphas
     return np.asarray(covariance / np.outer(size, size), dtype=float)
 
 
-def _unit(k: int) -> Array:
+def _pseudo_inertia_unit(k: int) -> Array:
     """Return the derivative (4, 4) of the pseudo-inertia with respect to inertial parameter k.
 
     k is the index in XX XY XZ YY YZ ZZ MX MY MZ M.
     """
     ten = SX(DM([float(k == n) for n in range(10)]))
-    return _numbers(_matrix(PseudoInertia.of(Inertia.from_parameters(ten))))
+    return _constant_array(_body_pseudo_inertia(PseudoInertia.of(Inertia.from_parameters(ten))))
 
 
-def _matrix(body: PseudoInertia) -> SX:
+def _body_pseudo_inertia(body: PseudoInertia) -> SX:
     """Return the pseudo-inertia (4, 4) of a body."""
     upper = casadi.horzcat(body.S, body.ms)
     return casadi.densify(casadi.vertcat(upper, casadi.horzcat(body.ms.T, body.m)))
 
 
-def _numbers(value: Any) -> Array:
+def _constant_array(value: Any) -> Array:
     """Return a constant CasADi expression as a NumPy array."""
     return np.asarray(DM(value).full(), dtype=float)
 
@@ -508,8 +510,8 @@ def physically_consistent(
     error = unconstrained_error(observations)
     freedom = max(error.size - observations.W.shape[2], 1)
     deviation = float(np.linalg.norm(error)) / np.sqrt(freedom)
-    weights = np.full(error.shape[1], 1 / _positive(deviation, observations.y))
-    return _with_weights(observations, weights, prior or Prior(), watch)
+    weights = np.full(error.shape[1], 1 / _above_floor(deviation, observations.y))
+    return _consistent_estimate(observations, weights, prior or Prior(), watch)
 
 
 def consistent_weighted(
@@ -533,9 +535,9 @@ def consistent_weighted(
     error = unconstrained_error(observations)
     rms = np.sqrt(np.mean(error**2, axis=0))
     weights = np.array(
-        [1 / _positive(float(x), y) for x, y in zip(rms, observations.y.T, strict=True)]
+        [1 / _above_floor(float(x), y) for x, y in zip(rms, observations.y.T, strict=True)]
     )
-    return _with_weights(observations, weights, prior or Prior(), watch)
+    return _consistent_estimate(observations, weights, prior or Prior(), watch)
 
 
 def unconstrained_error(observations: Observations) -> Array:
@@ -553,7 +555,7 @@ def unconstrained_error(observations: Observations) -> Array:
     return np.asarray(error.reshape(observations.y.shape), dtype=float)
 
 
-def _positive(deviation: float, efforts: Array) -> float:
+def _above_floor(deviation: float, efforts: Array) -> float:
     """Return `deviation`, but at least a small fraction of the rms of `efforts` [N m or N].
 
     Equations that fit exactly would otherwise get infinite weights.
@@ -561,7 +563,7 @@ def _positive(deviation: float, efforts: Array) -> float:
     return max(deviation, _EXACT * float(np.sqrt(np.mean(efforts**2))), _NO_DEVIATION)
 
 
-def _with_weights(
+def _consistent_estimate(
     observations: Observations, weights: Array, prior: Prior, watch: Watch | None
 ) -> Estimate:
     """Return the physically consistent estimate for the weights (m,) of the efforts.
@@ -578,7 +580,7 @@ def _with_weights(
     W, y = observations.rows
     w = np.broadcast_to(weights, observations.y.shape).reshape(-1)
     misfit = Misfit.of_rows(W * w[:, None], y * w)
-    values, covariance = likeliest(misfit, observations.columns, prior, watch)
+    values, covariance = penalised_minimum(misfit, observations.columns, prior, watch)
     method, error = "physically consistent", observations.y - observations.W @ values
     repeated = weights * np.sqrt(repetition(error) - 1)
     spread = (W * np.broadcast_to(repeated, error.shape).reshape(-1, 1)) @ covariance
@@ -645,6 +647,6 @@ def full_parameters(
     correlation = estimate.covariance / np.outer(deviations, deviations)
     root = np.linalg.inv(np.linalg.cholesky(correlation)) / deviations
     data = Misfit(root @ matrix, root @ estimate.values)
-    values, covariance = likeliest(data, columns, prior or Prior())
+    values, covariance = penalised_minimum(data, columns, prior or Prior())
     misfit = (matrix @ values - estimate.values) / deviations
     return FullSet(tuple(columns), values, covariance, estimate.names, misfit)

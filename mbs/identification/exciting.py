@@ -120,7 +120,7 @@ class CriterionFunction(casadi.Callback):
         casadi.Callback.__init__(self)
         self._criterion = criterion
         self._n = n
-        self._slopes: list[_Slope] = []
+        self._slopes: list[_CriterionGradient] = []
         self.construct("criterion", {})
 
     def get_n_in(self) -> int:
@@ -149,11 +149,11 @@ class CriterionFunction(casadi.Callback):
 
     def get_jacobian(self, name: str, *_: Any) -> casadi.Function:
         """Return a callback of (G, f) for the gradient as one row (1, n^2), with this name."""
-        self._slopes.append(_Slope(self._criterion, self._n, name))
+        self._slopes.append(_CriterionGradient(self._criterion, self._n, name))
         return self._slopes[-1]
 
 
-class _Slope(casadi.Callback):
+class _CriterionGradient(casadi.Callback):
     """CasADi callback ``(G, f) -> df/dG`` (1, n^2): gradient of a criterion of G (n, n)."""
 
     def __init__(self, criterion: Criterion, n: int, name: str) -> None:
@@ -311,7 +311,7 @@ class Programme:
         Raises:
             SolverError: no random motion gives observations of full column rank.
         """
-        rates, value_at = self._rates(), self._evaluation()
+        rates, value_at = self._motion_matrix(), self._evaluation()
         found: list[tuple[float, Array]] = []
         for k in range(_STARTS):
             x = self._random(rates, _FILLED * 0.5 ** (k % 3), rng)
@@ -328,7 +328,7 @@ class Programme:
     def _random(self, rates: Array, filled: float, rng: np.random.Generator) -> Array:
         """Return the variables of a random motion over the fraction `filled` of the joint ranges.
 
-        `rates` is the matrix of `_rates`.
+        `rates` is the matrix of `_motion_matrix`.
         """
         m = self.joints
         lower, upper = self._ranges(1.0)
@@ -356,7 +356,7 @@ class Programme:
         """
         variables, W, bounded = self._graph()
         criterion = CriterionFunction(self.criterion, W.shape[0])
-        rates = self._bounded_rates()
+        rates = self._limited_motion_rows()
         rows, ends = self._bounded_models(tightened)
         g = casadi.vertcat(_product(rates[0], variables), casadi.vec(bounded[rows, :]))
         scale = np.concatenate([rates[2] - rates[1], np.tile(_spans(ends), self.samples)])
@@ -380,7 +380,9 @@ class Programme:
     def _graph(self) -> tuple[MX, MX, MX]:
         """Return variables, W' (k, m samples) and limited model quantities (r, samples) as MX."""
         variables = MX.sym("x", self.joints * (2 * self.harmonics - 1))
-        moved = casadi.reshape(_product(self._rates(), variables), self.samples, 3 * self.joints).T
+        moved = casadi.reshape(
+            _product(self._motion_matrix(), variables), self.samples, 3 * self.joints
+        ).T
         q, v, a = casadi.vertsplit(moved, self.joints)
         W, bounded = self.instant.map(self.samples)(q, v, a)
         return variables, W, bounded
@@ -391,7 +393,7 @@ class Programme:
         gram = Function("gram", [variables], [W @ W.T])
         return lambda x: self.criterion(np.array(gram(x)))[0]
 
-    def _rates(self) -> Array:
+    def _motion_matrix(self) -> Array:
         """Return the matrix (3 m samples, variables) that maps variables to q, v and a."""
         m, H = self.joints, self.harmonics
         t = np.arange(self.samples) * self.period / self.samples
@@ -414,15 +416,15 @@ class Programme:
         half = np.where(limited[:, None], ends, 0.0).sum(axis=1) / 2
         return half + part * (ends[:, 0] - half), half + part * (ends[:, 1] - half)
 
-    def _bounded_rates(self) -> tuple[Array, Array, Array]:
-        """Return the rows of `_rates` that have limits, and the lower and upper limit of each row.
+    def _limited_motion_rows(self) -> tuple[Array, Array, Array]:
+        """Return the limited rows of `_motion_matrix`, with their lower and upper limits.
 
         The ranges are reduced so that the limits also hold between samples.
         """
         lower, upper = self._ranges(between_samples(self.samples, self.harmonics))
         limited = np.repeat(np.isfinite(lower) & np.isfinite(upper), self.samples)
         first, last = (np.repeat(x, self.samples)[limited] for x in (lower, upper))
-        return self._rates()[limited], first, last
+        return self._motion_matrix()[limited], first, last
 
     def _bounded_models(self, tightened: Array) -> tuple[list[int], Array]:
         """Return indices and ranges (rows, 2) of the limited quantities of models.
@@ -586,22 +588,26 @@ def excitation(
         effort=effort,
         planes=planes,
     )
-    form = _form(series)
+    form = _settings(series)
     chosen = _columns(system, columns)
-    smooth = _smooth(system, limits, form)
+    smooth = _with_smooth_friction(system, limits, form)
     function = instant(smooth, chosen, limits)
     programme = Programme(
         form.period, form.harmonics, form.samples, function, CRITERIA[objective], limits
     )
-    measured = partial(_measure, system, chosen, programme)
+    measured = partial(_measured_trajectory, system, chosen, programme)
     steps = _FIRST_ROUNDS * (starts if starts > 1 else 0)
     with progress(f"{system.name}: excitation", 0.0, steps + rounds, quiet=quiet) as reached:
-        x = _best(programme, np.random.default_rng(seed), starts, reached)
-        found = _within(programme, measured, x, rounds, lambda part: reached(steps + part * rounds))
+        x = _best_start(programme, np.random.default_rng(seed), starts, reached)
+        found = _limited_motion(
+            programme, measured, x, rounds, lambda part: reached(steps + part * rounds)
+        )
     return replace(found, objective=objective)
 
 
-def _best(programme: Programme, rng: np.random.Generator, starts: int, reached: Watch) -> Array:
+def _best_start(
+    programme: Programme, rng: np.random.Generator, starts: int, reached: Watch
+) -> Array:
     """Return the variables of the random motion with the best result of a short optimisation.
 
     Args:
@@ -621,7 +627,7 @@ def _best(programme: Programme, rng: np.random.Generator, starts: int, reached: 
     return min(found, key=lambda answer: (answer.violation > _ALLOWED, answer.value)).x
 
 
-def _within(
+def _limited_motion(
     programme: Programme,
     measured: Callable[[Array], Trajectory],
     x: Array,
@@ -651,7 +657,7 @@ def _within(
     )
 
 
-def _measure(
+def _measured_trajectory(
     system: System, columns: tuple[Column, ...], programme: Programme, x: Array
 ) -> Trajectory:
     """Return the motion of the variables x with its condition numbers and margins.
@@ -684,7 +690,7 @@ def _measure(
     )
 
 
-def _form(series: FourierSettings | None) -> FourierSettings:
+def _settings(series: FourierSettings | None) -> FourierSettings:
     """Return the settings of the Fourier series; defaults for None. Raise for a wrong type."""
     if series is None:
         return FourierSettings()
@@ -712,7 +718,7 @@ def _columns(
     return chosen
 
 
-def _smooth(system: System, limits: MotionLimits, form: FourierSettings) -> System:
+def _with_smooth_friction(system: System, limits: MotionLimits, form: FourierSettings) -> System:
     """Return a copy of the system in which Coulomb friction changes its sign continuously.
 
     The width of the transition is a fraction of the largest velocity of each joint.

@@ -50,7 +50,7 @@ def leads_of(system: System, q: Array) -> Array:
     if system.closure.varies:
         return leads
     size = len(system.closure.passive)
-    rows = np.asarray(_passive_rows(system).map(n)(DM(q.T), p)).T.reshape(n, size, size)
+    rows = np.asarray(_passive_closure_columns(system).map(n)(DM(q.T), p)).T.reshape(n, size, size)
     return np.asarray(leads * np.linalg.slogdet(rows)[0] * _usual_sign(system), dtype=float)
 
 
@@ -69,7 +69,7 @@ def signed_leads(system: System) -> Function:
         assert system.closure is not None
         size = len(system.closure.passive)
         if not system.closure.varies and size <= _LARGEST:
-            rows = casadi.reshape(_passive_rows(system)(q, p), size, size)
+            rows = casadi.reshape(_passive_closure_columns(system)(q, p), size, size)
             value = value * casadi.sign(_determinant(rows)) * _usual_sign(system)
         return Function("leads", [q], [value], {"cse": True})
 
@@ -97,13 +97,13 @@ def regular(system: System, q: Array) -> npt.NDArray[np.bool_]:
 def _usual_sign(system: System) -> float:
     """Return the sign of det(J_p) at the assembled configuration, J_p as in `leads_of`."""
     rows = np.asarray(
-        _passive_rows(system)(DM(system.configuration), DM(system.parameter_values()))
+        _passive_closure_columns(system)(DM(system.configuration), DM(system.parameter_values()))
     )
     size = round(rows.size**0.5)
     return float(np.linalg.slogdet(rows.reshape(size, size))[0]) or 1.0
 
 
-def _passive_rows(system: System) -> Function:
+def _passive_closure_columns(system: System) -> Function:
     """Return (q, p) -> (r r, 1): passive columns (r, r) of the closure Jacobian, as one column."""
 
     def build() -> Function:
@@ -164,11 +164,11 @@ def configuration_of(system: System, q_a: MX) -> MX:
     p = DM(system.parameter_values())
     if is_explicit(system):
         inputs = [q_a, p] if system.parameters else [q_a]
-        return _near_configuration(system, MX(Function.__call__(closed_form(system), *inputs)))
+        return _unwrapped_configuration(system, MX(Function.__call__(closed_form(system), *inputs)))
     return MX(follow_active(system)(q_a, p))
 
 
-def _near_configuration(system: System, q: MX) -> MX:
+def _unwrapped_configuration(system: System, q: MX) -> MX:
     """Shift the passive angles in q (nq, 1) by full turns, to within half a turn of the assembly.
 
     Closed forms return angles between -pi and pi, which would jump within a motion.
@@ -181,7 +181,7 @@ def _near_configuration(system: System, q: MX) -> MX:
     return MX(casadi.vertcat(*rows))
 
 
-def of_motion(model: Any) -> Function:
+def motion_function(model: Any) -> Function:
     """Return a model as a Function of the motion only, with parameters at their default values.
 
     Args:

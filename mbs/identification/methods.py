@@ -77,7 +77,7 @@ class Setting:
             return values
 
 
-def _by_instruments(setting: Setting) -> Estimator:
+def _instrumental_estimator(setting: Setting) -> Estimator:
     """Return the instrumental-variable estimator, with instruments from a simulated motion."""
 
     def estimator(observations: Observations) -> Estimate:
@@ -91,7 +91,7 @@ def _by_instruments(setting: Setting) -> Estimator:
     return estimator
 
 
-def _by_bodies(setting: Setting) -> Estimator:
+def _bodies_estimator(setting: Setting) -> Estimator:
     """Return the estimator that computes base parameters from physically consistent bodies."""
 
     def estimator(observations: Observations) -> Estimate:
@@ -105,19 +105,19 @@ def _by_bodies(setting: Setting) -> Estimator:
     return estimator
 
 
-def _always(estimator: Estimator) -> Callable[[Setting], Estimator]:
+def _same_estimator(estimator: Estimator) -> Callable[[Setting], Estimator]:
     """Return a factory that returns the same estimator for all settings."""
     return lambda _: estimator
 
 
 METHODS: Mapping[str, Callable[[Setting], Estimator]] = MappingProxyType(
     {
-        "least_squares": _always(least_squares),
-        "weighted": _always(weighted),
-        "reweighted": _always(iteratively_reweighted),
-        "robust": _always(huber),
-        "instrumental": _by_instruments,
-        "consistent": _by_bodies,
+        "least_squares": _same_estimator(least_squares),
+        "weighted": _same_estimator(weighted),
+        "reweighted": _same_estimator(iteratively_reweighted),
+        "robust": _same_estimator(huber),
+        "instrumental": _instrumental_estimator,
+        "consistent": _bodies_estimator,
     }
 )
 """Estimation methods for base parameters, by name."""
@@ -186,9 +186,9 @@ def essential(
             f"essential parameters: {estimate.method} has no deviations; use weighted()"
         )
     distribution = optional_module("scipy.stats", "identify").f
-    free, dropped = _freedom(estimate), list[int]()
+    free, dropped = _degrees_of_freedom(estimate), list[int]()
     while True:
-        kept, values, covariance = _without(estimate, dropped)
+        kept, values, covariance = _restricted(estimate, dropped)
         share = percent_of(values, covariance)
         worst = kept[int(np.argmax(share))]
         name, following = estimate.names[worst], [*dropped, worst]
@@ -198,7 +198,7 @@ def essential(
         if len(kept) == 1:
             reason = f"{name} is the last parameter"
             break
-        ratio = _ratio(estimate, following)
+        ratio = _f_statistic(estimate, following)
         if ratio > float(distribution.isf(significance, len(following), free)):
             reason = f"without {name} the errors grow more than noise explains (F = {ratio:.3g})"
             break
@@ -207,13 +207,13 @@ def essential(
     return Essential(_estimate(estimate, kept, values, covariance), names, reason)
 
 
-def _freedom(estimate: Estimate) -> float:
+def _degrees_of_freedom(estimate: Estimate) -> float:
     """Return the degrees of freedom: independent equations minus parameters, at least one."""
     error = estimate.residuals.error
     return max(float(np.sum(len(error) / repetition(error))) - len(estimate.values), 1.0)
 
 
-def _without(estimate: Estimate, dropped: Sequence[int]) -> tuple[list[int], Array, Array]:
+def _restricted(estimate: Estimate, dropped: Sequence[int]) -> tuple[list[int], Array, Array]:
     """Return indices, values and covariance of the other parameters if those in `dropped` are zero.
 
     Source: Draper & Smith 1998 (restricted least squares, from the covariance).
@@ -227,7 +227,7 @@ def _without(estimate: Estimate, dropped: Sequence[int]) -> tuple[list[int], Arr
     return kept, values, C[np.ix_(kept, kept)] - gain @ shared.T
 
 
-def _ratio(estimate: Estimate, dropped: Sequence[int]) -> float:
+def _f_statistic(estimate: Estimate, dropped: Sequence[int]) -> float:
     """Return the F statistic of the hypothesis that the parameters `dropped` (indices) are zero."""
     size = estimate.deviations[dropped]
     values = estimate.values[dropped] / size

@@ -14,7 +14,7 @@ from casadi import DM
 from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.identification._base_parameters import BaseParameters
-from mbs.identification.leading import of_motion, positions, regular
+from mbs.identification.leading import motion_function, positions, regular
 from mbs.identification.record import ORDER, Samples, zero_phase
 from mbs.identification.regressors import (
     Column,
@@ -43,7 +43,7 @@ _ROUNDING = 1e-9
 interval in spite of rounding. Sampling periods are a thousand times larger."""
 
 
-def led_rows(system: System, q: Array) -> Chosen:
+def regular_rows(system: System, q: Array) -> Chosen:
     """Return a mask (n,) of the configurations that are not close to singular ones.
 
     Args:
@@ -65,7 +65,7 @@ def led_rows(system: System, q: Array) -> Chosen:
     return good
 
 
-def on_lines(values: Array, good: Chosen) -> Array:
+def interpolated(values: Array, good: Chosen) -> Array:
     """Return values with the rows that are not good replaced by linear interpolation.
 
     Args:
@@ -101,7 +101,7 @@ def without(time: Array, bad: Array, ahead: float, back: float) -> Chosen:
 _BATCH = 500
 
 
-def known_of(regressor: Any, samples: Samples) -> Array:
+def known_efforts_at(regressor: Any, samples: Samples) -> Array:
     """Return the efforts (n, m) of springs and force elements that have no column [N m or N].
 
     Args:
@@ -114,7 +114,7 @@ def known_of(regressor: Any, samples: Samples) -> Array:
     q, v, _ = motion_of(regressor, samples)
     laws = [column.symbol for column in regressor.columns if column.symbol]
     kind = "independent" if _is_reduced(regressor) else "tree"
-    known = of_motion(known_efforts(system, kind, laws))
+    known = motion_function(known_efforts(system, kind, laws))
     pairs = zip(q, v, strict=True)
     return np.array([DM(known(*state)).full()[:, 0] for state in pairs])
 
@@ -148,7 +148,7 @@ def motion_of(model: Any, samples: Samples) -> tuple[Array, Array, Array]:
     )
 
 
-def led_samples(model: Any, samples: Samples) -> npt.NDArray[np.bool_]:
+def regular_samples(model: Any, samples: Samples) -> npt.NDArray[np.bool_]:
     """Return a mask (n,) of the samples that are not close to singular configurations.
 
     It is all True for an open system and for a model in tree coordinates.
@@ -165,7 +165,7 @@ def led_samples(model: Any, samples: Samples) -> npt.NDArray[np.bool_]:
         return samples.regular
     if not _is_reduced(model):
         return np.ones(len(samples.time), dtype=bool)
-    return led_rows(model.system, motion_of(model, samples)[0])
+    return regular_rows(model.system, motion_of(model, samples)[0])
 
 
 def with_regular(model: Any, samples: Samples) -> Samples:
@@ -175,7 +175,7 @@ def with_regular(model: Any, samples: Samples) -> Samples:
         model: model in the independent or tree coordinates of `model.system`.
         samples: motion of all joints, or of the independent joints.
     """
-    return replace(samples, regular=led_samples(model, samples))
+    return replace(samples, regular=regular_samples(model, samples))
 
 
 def _is_reduced(model: Any) -> bool:
@@ -205,7 +205,7 @@ def evaluated(model: Any, samples: Samples) -> list[Array]:
         ModelError: the widths of the samples do not match the coordinates of the model, or the
             model depends on states or inputs of components.
     """
-    along = of_motion(model)  # # measured positions do not close the loops exactly
+    along = motion_function(model)  # # measured positions do not close the loops exactly
     states = motion_of(model, samples)[: along.n_in()]
     n = len(samples.time)
     size = min(_BATCH, n)
@@ -217,7 +217,7 @@ def evaluated(model: Any, samples: Samples) -> list[Array]:
         for whole, part in zip(found, values if len(found) > 1 else [values], strict=True):
             m, k = whole.shape[1:]
             whole[rows] = np.asarray(part).reshape(m, size, k).transpose(1, 0, 2)
-    return [on_lines(whole, led_samples(model, samples)) for whole in found]
+    return [interpolated(whole, regular_samples(model, samples)) for whole in found]
 
 
 # Equations of a record: one row per instant and effort.
@@ -364,7 +364,7 @@ def observe(regressor: Any, samples: Samples) -> Observations:
         ModelError: the widths of the samples do not match the coordinates of the regressor, or more
             than half of the samples are close to singular configurations.
     """
-    keep = led_samples(regressor, samples)
+    keep = regular_samples(regressor, samples)
     full = replace(_observe(regressor, samples), dropped=int(np.sum(~keep)))
     return full if keep.all() else full.at(samples.time[keep])
 
@@ -374,7 +374,7 @@ def _observe(regressor: Any, samples: Samples) -> Observations:
     return Observations(
         samples.time,
         evaluated(regressor, samples)[0],
-        samples.tau - known_of(regressor, samples),
+        samples.tau - known_efforts_at(regressor, samples),
         tuple(regressor.columns),
         samples.efforts,
         samples.effort_units,
@@ -438,7 +438,7 @@ def clear_of_singular(
         before: length of the window after the instant of an equation [s].
         after: length of the window before that instant [s]. The default is the same length.
     """
-    bad = samples.time[~led_samples(model, samples)]
+    bad = samples.time[~regular_samples(model, samples)]
     keep = without(found.time, bad, before, before if after is None else after)
     return replace(found.at(found.time[keep]), dropped=int(np.sum(~keep)))
 
@@ -505,7 +505,9 @@ def observe_energy(energy: Any, power: Any, samples: Samples, interval: float) -
         )
     (h,), (P,) = evaluated(energy, samples), evaluated(power, samples)
     v = motion_of(energy, samples)[1]
-    work = _integral(np.sum(v * (samples.tau - known_of(energy, samples)), axis=1), samples.rate)
+    work = _integral(
+        np.sum(v * (samples.tau - known_efforts_at(energy, samples)), axis=1), samples.rate
+    )
     taken = h[:, 0] + _integral(P[:, 0], samples.rate)
     ends = np.arange(0, len(samples.time), step)
     found = Observations(
@@ -565,7 +567,7 @@ def observe_momentum(filtered: Any, samples: Samples, corner: float) -> Observat
             f" {len(samples.time) / rate:.3g} s; give less than {rate:g} and a longer record"
         )
     D1, D2 = evaluated(filtered, samples)
-    tau = samples.tau - known_of(filtered, samples)
+    tau = samples.tau - known_efforts_at(filtered, samples)
     plain, slope = ([0.0, 0.0, corner**2], [0.0, corner**2, 0.0])
     keep = slice(settled, None, max(round(_ROWS * rate / corner), 1))
     W = (
@@ -604,7 +606,9 @@ INTERVALS = 1.0
 """Number of intervals of the energy model per period of the bandwidth."""
 
 
-def _dynamic(system: System, samples: Samples, bandwidth: float, options: Any) -> Observations:
+def _dynamic_equations(
+    system: System, samples: Samples, bandwidth: float, options: Any
+) -> Observations:
     """Return the equations of the dynamic model, with the same filter on both sides.
 
     `bandwidth` is unused, because the samples contain it; `options` are those of `columns_of`.
@@ -612,7 +616,9 @@ def _dynamic(system: System, samples: Samples, bandwidth: float, options: Any) -
     return observe_filtered(regressor(system, **options), samples)
 
 
-def _filter(system: System, samples: Samples, bandwidth: float, options: Any) -> Observations:
+def _filtered_equations(
+    system: System, samples: Samples, bandwidth: float, options: Any
+) -> Observations:
     """Return the equations of the filtered model with the bandwidth [Hz] as corner frequency.
 
     `options` are those of `columns_of`.
@@ -620,7 +626,9 @@ def _filter(system: System, samples: Samples, bandwidth: float, options: Any) ->
     return observe_momentum(filtered_regressor(system, **options), samples, 2 * np.pi * bandwidth)
 
 
-def _energy(system: System, samples: Samples, bandwidth: float, options: Any) -> Observations:
+def _energy_equations(
+    system: System, samples: Samples, bandwidth: float, options: Any
+) -> Observations:
     """Return the equations of the energy model, with intervals of one period of the bandwidth [Hz].
 
     `options` are those of `columns_of`.
@@ -630,7 +638,7 @@ def _energy(system: System, samples: Samples, bandwidth: float, options: Any) ->
 
 
 EQUATIONS: Mapping[str, Callable[[System, Samples, float, Any], Observations]] = MappingProxyType(
-    {"dynamic": _dynamic, "filtered": _filter, "energy": _energy}
+    {"dynamic": _dynamic_equations, "filtered": _filtered_equations, "energy": _energy_equations}
 )
 """Functions of the identification models: (system, samples, bandwidth, column options) ->
 equations."""
@@ -676,9 +684,9 @@ class ExcitationQuality:
         """Names of the parameters that are not identifiable, as text; empty if there are none."""
         parts = []
         if self.unseen:
-            parts.append(f"{_list(self.unseen)} cannot be seen at all")
+            parts.append(f"{_name_list(self.unseen)} cannot be seen at all")
         if self.inseparable:
-            parts.append(f"{_list(self.inseparable)} cannot be told apart")
+            parts.append(f"{_name_list(self.inseparable)} cannot be told apart")
         return " and ".join(parts)
 
 
@@ -741,7 +749,7 @@ def require_visible(observations: Observations) -> ExcitationQuality:
     return quality
 
 
-def _list(names: tuple[str, ...]) -> str:
+def _name_list(names: tuple[str, ...]) -> str:
     """Return names as text, separated by commas; names after the eighth are only counted."""
     more = len(names) - _LISTED
     return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")

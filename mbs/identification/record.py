@@ -378,7 +378,7 @@ class Record:
     def __post_init__(self) -> None:
         for name in ("time", "q", "tau", "v"):
             if getattr(self, name) is not None or name != "v":
-                object.__setattr__(self, name, _numbers(name, getattr(self, name)))
+                object.__setattr__(self, name, _read_only(name, getattr(self, name)))
         for name in ("names", "units", "efforts", "effort_units"):
             if isinstance(getattr(self, name), str):
                 raise ModelError(
@@ -512,7 +512,7 @@ class Record:
             start: first instant that is included [s].
             stop: last instant that is included [s].
         """
-        return self._rows((self.time >= start) & (self.time <= stop))
+        return self._selected((self.time >= start) & (self.time <= stop))
 
     def pieces(self, longest: float | None = None) -> list[Record]:
         """Split the record at its gaps, as input of `identify`.
@@ -531,7 +531,7 @@ class Record:
         at, found = np.arange(len(self.time)), []
         for first, last in pairwise(ends):
             if last - first >= SHORTEST:
-                found.append(self._rows((at >= first) & (at < last)))
+                found.append(self._selected((at >= first) & (at < last)))
         if not found:
             raise ModelError(
                 f"record: every piece between steps of more than {most:.3g} s has less than"
@@ -539,7 +539,7 @@ class Record:
             )
         return found
 
-    def _rows(self, keep: npt.NDArray[np.bool_]) -> Record:
+    def _selected(self, keep: npt.NDArray[np.bool_]) -> Record:
         """Return the record with the rows of a mask (n,) only."""
         v = None if self.v is None else self.v[keep]
         return replace(self, time=self.time[keep], q=self.q[keep], tau=self.tau[keep], v=v)
@@ -561,9 +561,9 @@ def motor_to_joint(N: Any, q_motor: Any, tau_motor: Any) -> tuple[Array, Array]:
     Raises:
         ModelError: the shape of N does not match the data, or N is singular.
     """
-    ratios = _numbers("N", N)
+    ratios = _read_only("N", N)
     matrix = np.diag(ratios) if ratios.ndim == 1 else ratios
-    q, tau = _numbers("q_motor", q_motor), _numbers("tau_motor", tau_motor)
+    q, tau = _read_only("q_motor", q_motor), _read_only("tau_motor", tau_motor)
     width = q.shape[1] if q.ndim == 2 else 0
     if matrix.shape != (width, width) or tau.shape != q.shape:
         raise ModelError(
@@ -632,7 +632,7 @@ def _check_order(what: str, given: Sequence[str], joints: Sequence[str]) -> None
             )
 
 
-def _numbers(name: str, values: Any) -> Array:
+def _read_only(name: str, values: Any) -> Array:
     """Return `values` as a read-only array of floats.
 
     Raises ModelError for other types; `name` is the argument name in its message.

@@ -57,12 +57,12 @@ COUPLED = ("Iam", "Fvm", "Fsm")
 Coulomb friction."""
 
 _INERTIAL_UNITS = ("kg.m2",) * 6 + ("kg.m",) * 3 + ("kg",)
-_TURNING = {
+_REVOLUTE_UNITS = {
     **{kind: "kg.m2" for kind in ("Ia", "Iam", "Jm")},
     **{kind: "N.m.s/rad" for kind in ("Fv", "Fvm")},
     **{kind: "N.m" for kind in ("Fs", "Fsm", "offset")},
 }
-_SLIDING = {
+_PRISMATIC_UNITS = {
     **{kind: "kg" for kind in ("Ia", "Iam")},
     **{kind: "N.s/m" for kind in ("Fv", "Fvm")},
     **{kind: "N" for kind in ("Fs", "Fsm", "offset")},
@@ -156,10 +156,10 @@ def columns_of(
             *(_friction_kinds(link) if friction else ()),
             *(("offset",) if offsets and link.motion.nv == 1 else ()),
         ]
-        columns += _inertial(number)
+        columns += _inertial_columns(number)
         columns += [Column(f"{kind}{number}", kind, number, _unit(link, kind)) for kind in kinds]
     for pair in couplings:
-        columns += _couple(system, pair)
+        columns += _coupled_motor_columns(system, pair)
     columns += [_law_column(system, name, laws) for name in laws]
     return tuple(columns)
 
@@ -268,7 +268,7 @@ def chosen_columns(
             " columns alone"
         )
     require_columns(system, columns)
-    numbers_among(system, every_column(system, columns), columns)
+    column_indices(system, every_column(system, columns), columns)
     if len({column.key for column in columns}) < len(columns):
         twice = next(c for k, c in enumerate(columns) if c.key in {b.key for b in columns[:k]})
         raise ModelError(f"{system.name}: {quoted(twice.name)} is given twice; give it once")
@@ -310,7 +310,7 @@ def every_column(system: System, columns: Sequence[Column]) -> tuple[Column, ...
     )
 
 
-def numbers_among(system: System, every: Sequence[Column], columns: Sequence[Column]) -> list[int]:
+def column_indices(system: System, every: Sequence[Column], columns: Sequence[Column]) -> list[int]:
     """Return the indices in `every` of the parameters `columns`, which may have other names.
 
     Args:
@@ -380,7 +380,7 @@ def _joint_value(link: Link, kind: str) -> SX:
     return known.get(kind, SX(0))
 
 
-def _inertial(number: int) -> list[Column]:
+def _inertial_columns(number: int) -> list[Column]:
     """Return the columns of the ten inertial parameters of the link with this number (from 1)."""
     pairs = zip(INERTIAL, _INERTIAL_UNITS, strict=True)
     return [Column(f"{kind}{number}", kind, number, unit) for kind, unit in pairs]
@@ -407,10 +407,10 @@ def _friction_kinds(link: Link) -> list[str]:
 
 def _unit(link: Link, kind: str) -> str:
     """Return the unit of a joint parameter of this kind, which depends on the type of the joint."""
-    return (_SLIDING if link.motion is Motion.PRISMATIC else _TURNING)[kind]
+    return (_PRISMATIC_UNITS if link.motion is Motion.PRISMATIC else _REVOLUTE_UNITS)[kind]
 
 
-def _couple(system: System, pair: Joints) -> list[Column]:
+def _coupled_motor_columns(system: System, pair: Joints) -> list[Column]:
     """Return the columns Iam, Fvm, Fsm of a motor that is coupled to the two joints of `pair`.
 
     Raises ModelError unless they are two joints of the same type.
@@ -420,7 +420,7 @@ def _couple(system: System, pair: Joints) -> list[Column]:
             f"{system.name}: the coupling {quoted(pair)} does not name two joints; give a pair such"
             " as ('j6', 'j5')"
         )
-    number, other = (_joint(system, name) for name in pair)
+    number, other = (_joint_number(system, name) for name in pair)
     link, second = (system.tree.links[k - 1] for k in (number, other))
     if number == other or link.motion is not second.motion:
         raise ModelError(
@@ -431,7 +431,7 @@ def _couple(system: System, pair: Joints) -> list[Column]:
     return [Column(f"{k}{number}", k, number, _unit(link, k), other) for k in COUPLED]
 
 
-def _joint(system: System, name: str | int) -> int:
+def _joint_number(system: System, name: str | int) -> int:
     """Return the link number (from 1) of a joint of one degree of freedom, by name or number.
 
     Raises ModelError if there is no such joint.
@@ -494,11 +494,11 @@ class JointColumns:
             base: acceleration of the base.
         """
         if column.kind != "Jm":
-            return self._own(column, self.v, a)
+            return self._own_effort(column, self.v, a)
         alone = self._with_one_rotor(column)
         total = rotor_efforts(alone, a, motions, base)
         for c, moment in rotor_moments(alone, self.v, a, motions).items():
-            total += self._along(self._twists(c), moment)
+            total += self._moment_efforts(self._twists(c), moment)
         return total
 
     def momentum(self, column: Column) -> SX:
@@ -509,13 +509,13 @@ class JointColumns:
         if column.kind not in _INERTIAS:
             return zeros(self.tree.nv)
         if column.kind != "Jm":
-            return self._own(column, zeros(self.tree.nv), self.v)
+            return self._own_effort(column, zeros(self.tree.nv), self.v)
         link, rotor = self._rotor(column)
         total = zeros(self.tree.nv)
-        total[link.v] = rotor.seen_at_joint * self.v[link.v] + self._spin(rotor)
+        total[link.v] = rotor.seen_at_joint * self.v[link.v] + self._carrier_momentum(rotor)
         if rotor.carrier >= 0:
             spin = rotor.momentum * self.v[link.v]
-            total += self._along(self._twists(rotor.carrier), spin)
+            total += self._moment_efforts(self._twists(rotor.carrier), spin)
         return total
 
     def rest(self, column: Column) -> SX:
@@ -524,12 +524,12 @@ class JointColumns:
         These are the joint efforts minus the time derivative of the generalised momentum.
         """
         if column.kind != "Jm":
-            return self._own(column, self.v, zeros(self.tree.nv))
+            return self._own_effort(column, self.v, zeros(self.tree.nv))
         link, rotor = self._rotor(column)
         if rotor.carrier < 0:
             return zeros(self.tree.nv)
         rates = path_twist_rates(self.tree, self.poses, self.velocities)
-        return -self._along(rates[rotor.carrier], rotor.momentum * self.v[link.v])
+        return -self._moment_efforts(rates[rotor.carrier], rotor.momentum * self.v[link.v])
 
     def energy(self, column: Column) -> SX:
         """Return the kinetic energy per unit of a parameter; zero for friction and offsets."""
@@ -543,7 +543,7 @@ class JointColumns:
             return SX(0)
         return SX(casadi.dot(self.v, self.rest(column)))
 
-    def _own(self, column: Column, v: SX, a: SX) -> SX:
+    def _own_effort(self, column: Column, v: SX, a: SX) -> SX:
         """Return the joint efforts (nv, 1) of a unit parameter that acts on its own joint only.
 
         v and a are (nv, 1) joint velocities and accelerations. Coupled motors act on two joints.
@@ -556,10 +556,10 @@ class JointColumns:
         Ia, Fv, Fs = (one.get(kind, SX(0)) for kind in ("Ia", "Fv", "Fs"))
         unit = replace(link, Ia=Ia, Fv=Fv, Fs=Fs)
         if column.kind not in COUPLED:
-            total[link.v] = _law(unit, v[link.v], a[link.v])
+            total[link.v] = _joint_law(unit, v[link.v], a[link.v])
             return total
         second = self.tree.links[column.other - 1]
-        effort = _law(unit, v[link.v] + v[second.v], a[link.v] + a[second.v])
+        effort = _joint_law(unit, v[link.v] + v[second.v], a[link.v] + a[second.v])
         total[link.v] = total[second.v] = effort
         return total
 
@@ -577,7 +577,7 @@ class JointColumns:
         assert link.rotor is not None
         return link, replace(link.rotor, inertia=SX(1))
 
-    def _spin(self, rotor: CarriedRotor) -> SX:
+    def _carrier_momentum(self, rotor: CarriedRotor) -> SX:
         """Return the momentum of a rotor at its joint that is due to the rotation of its carrier.
 
         The carrier is the link that supports the rotor, or the base.
@@ -589,7 +589,7 @@ class JointColumns:
         """Return the twists of the joints on the path from the base to link `carrier` (index)."""
         return path_twists(self.tree, self.poses)[carrier]
 
-    def _along(self, twists: list[PathTwist], moment: SX) -> SX:
+    def _moment_efforts(self, twists: list[PathTwist], moment: SX) -> SX:
         """Return the generalised forces (nv, 1) of a moment (3, 1) along the path twists."""
         total = zeros(self.tree.nv)
         for twist in twists:
@@ -597,7 +597,7 @@ class JointColumns:
         return total
 
 
-def _law(link: Link, v: SX, a: SX) -> SX:
+def _joint_law(link: Link, v: SX, a: SX) -> SX:
     """Return the efforts of rotor inertia and friction of a joint at its velocity v and rate a."""
     alone = replace(link, v=slice(0, link.motion.nv))
     return rotor_and_friction(Tree((alone,), zeros()), v, a)
@@ -695,7 +695,7 @@ def regressor(
         around = surroundings(system, moves=moving_base)
         motions = link_accelerations(tree, s.poses, s.v_tree, a_tree, around.base)
         joints, laws = JointColumns.of(tree, s.poses, s.v_tree), LawColumns(system, s)
-        D = side_by_side(
+        D = matrix_of_columns(
             taken,
             inertial_regressor(tree, s.poses, motions),
             lambda column: (
@@ -782,7 +782,7 @@ def regressor_function(
     return made
 
 
-def side_by_side(
+def matrix_of_columns(
     columns: tuple[Column, ...], blocks: list[SX], other: Callable[[Column], SX]
 ) -> SX:
     """Return the matrix (rows, n) with one column for each parameter.
@@ -836,7 +836,9 @@ def energy_regressor(
         joints = JointColumns.of(system.tree, s.poses, s.v_tree)
         blocks = inertial_energy(system.tree, s.poses, joints.velocities)
         laws = LawColumns(system, s)
-        h = side_by_side(taken, blocks, lambda c: laws.energy(c) if c.symbol else joints.energy(c))
+        h = matrix_of_columns(
+            taken, blocks, lambda c: laws.energy(c) if c.symbol else joints.energy(c)
+        )
         return [], [("h", h)]
 
     return regressor_function(system, ("energy_regressor", False, coordinates), taken, build)
@@ -872,7 +874,7 @@ def power_regressor(
         joints = JointColumns.of(system.tree, s.poses, s.v_tree)
         blocks = [zeros(1, 10) for _ in system.tree.links]
         laws = LawColumns(system, s)
-        power = side_by_side(
+        power = matrix_of_columns(
             taken, blocks, lambda c: laws.power(c) if c.symbol else joints.power(c)
         )
         return [], [("P", power)]
@@ -916,26 +918,28 @@ def filtered_regressor(
     taken = chosen_columns(system, columns, choice)
 
     def build(s: ModelSymbols) -> tuple[Named, Named]:
-        tree, base, inputs = _surroundings(system, moving_base)
+        tree, base, inputs = _base_motion(system, moving_base)
         joints = JointColumns.of(tree, s.poses, s.v_tree, base)
         momenta = momentum_regressor(tree, s.poses, joints.velocities)
         rests = position_regressor(tree, s.poses, joints.velocities)
         laws = LawColumns(system, s)
-        D1 = side_by_side(
+        D1 = matrix_of_columns(
             taken, momenta, lambda c: zeros(system.nv) if c.symbol else joints.momentum(c)
         )
         D2 = s.reduced_effort(
-            side_by_side(taken, rests, lambda c: laws.effort(c) if c.symbol else joints.rest(c))
+            matrix_of_columns(
+                taken, rests, lambda c: laws.effort(c) if c.symbol else joints.rest(c)
+            )
         )
         if s.reduction is not None:
-            D2 = D2 - casadi.mtimes(_rate(system, s, s.reduction.G).T, D1)
+            D2 = D2 - casadi.mtimes(_matrix_rate(system, s, s.reduction.G).T, D1)
         return inputs, [("D1", s.reduced_effort(D1)), ("D2", D2)]
 
     key = ("filtered_regressor", moving_base, coordinates)
     return regressor_function(system, key, taken, build)
 
 
-def _surroundings(system: System, moves: bool) -> tuple[Tree, Velocity | None, Named]:
+def _base_motion(system: System, moves: bool) -> tuple[Tree, Velocity | None, Named]:
     """Return the tree, the base velocity and the named inputs v_0 and R_0 of a moving base.
 
     Gravity of the tree is then in base axes. Without a moving base: None and no inputs.
@@ -947,7 +951,7 @@ def _surroundings(system: System, moves: bool) -> tuple[Tree, Velocity | None, N
     return tree, Velocity(v_0[0:3], v_0[3:6]), [("v_0", v_0), ("R_0", R_0)]
 
 
-def _rate(system: System, s: ModelSymbols, G: SX) -> SX:
+def _matrix_rate(system: System, s: ModelSymbols, G: SX) -> SX:
     """Return the time derivative of a matrix G that depends on the positions only."""
     qdot = position_rate(system.tree, s.q, s.v_tree)
     return casadi.reshape(casadi.jtimes(casadi.vec(G), s.q, qdot), *G.shape)

@@ -20,7 +20,7 @@ from mbs.identification.leading import (
     configuration_of,
     is_explicit,
     leads_of,
-    of_motion,
+    motion_function,
     positions,
     signed_leads,
 )
@@ -147,12 +147,12 @@ def resting_coefficients(period: float, harmonics: int) -> Array:
     """
     w = np.asarray(2 * np.pi / period * np.arange(1, harmonics + 1), dtype=float)
     # v(0) is the sum of a_k and a(0) the sum of w_k b_k: one condition for each half
-    halves = [_across(condition) for condition in (w**0, w)]
+    halves = [_orthogonal_complement(condition) for condition in (w**0, w)]
     none = np.zeros((harmonics, harmonics - 1))
     return np.block([[halves[0], none], [none, halves[1]]])
 
 
-def _across(direction: Array) -> Array:
+def _orthogonal_complement(direction: Array) -> Array:
     """Return an orthonormal basis (n, n - 1) of the complement of a direction (n,).
 
     A Householder reflection is used because the basis from a singular value decomposition depends
@@ -357,10 +357,10 @@ def limits_of(
     def rows(
         quantity: str, bound: Bound, units: Sequence[str], known: Mapping[str, Range] = free
     ) -> tuple[MotionLimit, ...]:
-        pairs = _pairs(system, quantity, bound, known)
+        pairs = _joint_ranges(system, quantity, bound, known)
         return tuple(MotionLimit(quantity, *row) for row in _join(list(known), units, pairs))
 
-    own, others = _positions(system, position, indices)
+    own, others = _position_limits(system, position, indices)
     positions = rows("position", own, [joint.unit for joint in joints])
     for limit in positions:
         if not (np.isfinite(limit.lower) and np.isfinite(limit.upper)):
@@ -376,26 +376,31 @@ def limits_of(
             )
     return MotionLimits(
         positions,
-        rows("velocity", velocity, rates, {name: _known(motors[name].limits) for name in free}),
+        rows(
+            "velocity",
+            velocity,
+            rates,
+            {name: _described_range(motors[name].limits) for name in free},
+        ),
         rows("acceleration", acceleration, [ACCELERATION_UNIT[unit] for unit in rates]),
         rows(
             "effort",
             effort,
             [EFFORT_UNIT[unit] for unit in rates],
-            {name: _known(motors[name].effort) for name in free},
+            {name: _described_range(motors[name].effort) for name in free},
         ),
         others,
         tuple(planes),
-        _leading(system),
+        _singularity_limit(system),
     )
 
 
-def _known(described: tuple[float, float] | None) -> Range:
+def _described_range(described: tuple[float, float] | None) -> Range:
     """Return the range of a joint as described, or None if both ends are infinite."""
     return None if described is None or np.isinf(described).all() else described
 
 
-def _leading(system: System) -> tuple[MotionLimit, ...]:
+def _singularity_limit(system: System) -> tuple[MotionLimit, ...]:
     """Return the limit of the distance from singular configurations; empty for an open system.
 
     It is reduced if the assembled configuration itself is close to a singular one.
@@ -406,7 +411,7 @@ def _leading(system: System) -> tuple[MotionLimit, ...]:
     return (MotionLimit("leading", system.name, "1", least, np.inf),)
 
 
-def _positions(
+def _position_limits(
     system: System, bound: Bound, indices: Sequence[int]
 ) -> tuple[Bound, tuple[tuple[int, MotionLimit], ...]]:
     """Return the position limits of independent joints, and of passive joints by index in q.
@@ -421,7 +426,7 @@ def _positions(
     passive = []
     for k, c in enumerate(system.coordinates):
         if k not in indices and ranges[c.name] is not None:
-            lower, upper = _pair(system, "position", ranges[c.name], c.name)
+            lower, upper = _joint_range(system, "position", ranges[c.name], c.name)
             passive.append((k, MotionLimit("position", c.name, c.unit, lower, upper)))
     if bound is None or isinstance(bound, Mapping):
         bound = [ranges[system.coordinates[k].name] for k in indices]
@@ -446,7 +451,7 @@ def _join(
     return [(name, unit, lower, upper) for name, unit, (lower, upper) in rows]
 
 
-def _pairs(
+def _joint_ranges(
     system: System, quantity: str, bound: Bound, described: Mapping[str, Range]
 ) -> list[tuple[float, float]]:
     """Return (lower, upper) of each joint in `described`, a dict from joint name to default range.
@@ -469,10 +474,10 @@ def _pairs(
             f"{system.name}: {quantity} has {len(values)} limits for {len(names)} independent"
             f" joints: {', '.join(names)}; give one for each"
         )
-    return [_pair(system, quantity, x, name) for x, name in zip(values, names, strict=True)]
+    return [_joint_range(system, quantity, x, name) for x, name in zip(values, names, strict=True)]
 
 
-def _pair(system: System, quantity: str, value: Range, name: str) -> tuple[float, float]:
+def _joint_range(system: System, quantity: str, value: Range, name: str) -> tuple[float, float]:
     """Return the lower and upper limit of one quantity of the joint `name`.
 
     A number is symmetric, None is unlimited. Raises ModelError for an empty or infinite range.
@@ -633,11 +638,11 @@ class Trajectory:
             f"Objective {self.objective}: {self.status} after {self.steps} steps",
             "quantity      name       lowest    highest      limits                margin",
         ]
-        lines += [_line(margin) for margin in self.margins if margin.limit.is_finite]
+        lines += [_margin_line(margin) for margin in self.margins if margin.limit.is_finite]
         return "\n".join(lines)
 
 
-def _line(margin: Margin) -> str:
+def _margin_line(margin: Margin) -> str:
     """Return one line of the table of margins."""
     limit = margin.limit
     ends = f"{limit.lower:9.4g} .. {limit.upper:<9.4g}"
@@ -671,10 +676,10 @@ def instant(system: System, columns: Sequence[Column], limits: MotionLimits) -> 
     m = len(system.active)
     q_a, v_a, a_a = (MX.sym(name, m) for name in ("q_a", "v_a", "a_a"))
     q = configuration_of(system, q_a)
-    D = of_motion(regressor(system, columns))(q, v_a, a_a)
+    D = motion_function(regressor(system, columns))(q, v_a, a_a)
     bounded = [*_efforts(system, limits, q, v_a, a_a), *(q[k] for k, _ in limits.passive)]
     for plane in limits.planes:
-        T = of_motion(transform(system, plane.frame))(q)
+        T = motion_function(transform(system, plane.frame))(q)
         bounded.append(casadi.dot(DM(plane.unit_normal), (T @ DM([*plane.point, 1.0]))[:3]))
     if limits.leading:
         bounded.append(signed_leads(system)(q))
@@ -697,5 +702,5 @@ def _efforts(system: System, limits: MotionLimits, q: MX, v_a: MX, a_a: MX) -> l
             f"{system.name}: limits of efforts are given and its motors are not its independent"
             " joints, so that they share efforts in many ways; leave the limits of efforts out"
         )
-    tau = of_motion(inverse_dynamics(system))(q, v_a, a_a)
+    tau = motion_function(inverse_dynamics(system))(q, v_a, a_a)
     return [tau[k] for k in range(len(limits.effort))]

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from mbs.assembly import System
+from mbs.assembly.component_instances import guesses_of_unknowns
 from mbs.assembly.degrees import like_degrees
 from mbs.assembly.open_system import open_system
-from mbs.assembly.parts import guesses_of_unknowns
 from mbs.assembly.variable_names import GUESSES
 from mbs.components import Description
 from mbs.errors import AssemblyError, Unclosable

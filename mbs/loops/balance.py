@@ -21,7 +21,7 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.parts import ComponentInstance
+from mbs.assembly.component_instances import ComponentInstance
 from mbs.assembly.tables import Balance, LoopRow
 from mbs.assembly.tree import Link
 from mbs.components import Description

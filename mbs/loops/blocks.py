@@ -27,7 +27,7 @@ from mbs.closed_forms.arm_certificate import (
     certified_configurations,
 )
 from mbs.closed_forms.arm_search import general_of
-from mbs.closed_forms.hexapod import LEGS, holds, poses
+from mbs.closed_forms.hexapod import LEGS, is_rigid, poses
 from mbs.closed_forms.planar_loops import KNOWN, PlanarLoops, planar_roots
 from mbs.closed_forms.ring import (
     PARAMETERS,
@@ -1217,7 +1217,9 @@ def _require_held(work: PlanWork, waiting: Sequence[int]) -> None:
             continue
         at = _side_by_side(frames, *_assembled(system))
         legs = [leg for leg in (_distance(leg, at, slides=True) for leg in found[1]) if leg]
-        if len(legs) == LEGS and not holds(*(np.array([leg[k] for leg in legs]) for k in (0, 1))):
+        if len(legs) == LEGS and not is_rigid(
+            *(np.array([leg[k] for leg in legs]) for k in (0, 1))
+        ):
             raise NoClosedForm(
                 f"{system.name}: the ends of its six legs lie so that they hold the platform at no"
                 " pose, as on similar hexagons, and the length of one leg follows from the others;"

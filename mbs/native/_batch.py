@@ -88,7 +88,7 @@ class ArrayPort:
                 expected shape.
         """
         array = doubles(value)
-        fault = array if isinstance(array, str) else self._fault(array)
+        fault = array if isinstance(array, str) else self._shape_error(array)
         if isinstance(array, str) or fault:
             raise ModelError(f"{owner}: input {self.name} {fault}")
         return array if self._steps(array) else np.array(array, order="C")
@@ -110,12 +110,12 @@ class ArrayPort:
             fault = f"is {kind}; give a numpy array of float64"
         elif isinstance(array, np.ma.MaskedArray):
             fault = "has a mask, which would be passed over; give an array without"
-        elif not (fault := self._fault(array)) and self._steps(array) is None:
+        elif not (fault := self._shape_error(array)) and self._steps(array) is None:
             fault = "has elements that are not evenly spaced in memory, in steps of 8 bytes"
         if fault:
             raise ModelError(f"{owner}: out for {self.name} {fault}")
 
-    def _fault(self, array: Array) -> str:
+    def _shape_error(self, array: Array) -> str:
         """Return an error text about the shape of an array; empty if the shape fits."""
         lengths = len(self.shape)
         if array.shape[-lengths:] == self.shape and array.ndim <= lengths + 1:
@@ -249,7 +249,7 @@ def joined(functions: Sequence[Function]) -> tuple[Function, list[ArrayPort], li
             results.append(casadi.vec(casadi.densify(result).T))
     name = "_".join(function.name() for function in functions)
     whole = Function(name, list(symbols.values()), results, list(ports), _labels(len(results)))
-    return _scalar(whole, len(functions)), list(ports.values()), outputs
+    return _scalar_function(whole, len(functions)), list(ports.values()), outputs
 
 
 def _shape(size: tuple[int, int]) -> tuple[int, ...]:
@@ -262,7 +262,7 @@ def _labels(count: int) -> list[str]:
     return [f"result{k}" for k in range(count)]
 
 
-def _scalar(function: Function, parts: int) -> Function:
+def _scalar_function(function: Function, parts: int) -> Function:
     """Expand a Function joined from `parts` Functions to scalar operations (SX).
 
     Common subexpressions are computed once. Functions that cannot be expanded are returned

@@ -199,12 +199,12 @@ def schedule(graph: Graph, phase: Sequence[int] | None = None) -> list[Step]:
     steps: list[Step] = []
     for batches in _batches(graph, pending, phase):
         angles = [angle for batch in batches for angle in batch.angles]
-        steps += _take(_ancestors(graph, angles, pending), pending)
+        steps += _pending_among(_ancestors(graph, angles, pending), pending)
         for batch in batches:
             steps.append(batch)
             for number, _ in batch.results:
                 pending[number] = False
-    return [*steps, *_take(range(len(graph.nodes)), pending)]
+    return [*steps, *_pending_among(range(len(graph.nodes)), pending)]
 
 
 def plain_order(graph: Graph) -> list[Step]:
@@ -284,7 +284,7 @@ def gives(step: Item) -> tuple[int, ...]:
     return (step,) if isinstance(step, int) else step.given()
 
 
-def _take(numbers: Iterable[int], pending: list[bool]) -> list[int]:
+def _pending_among(numbers: Iterable[int], pending: list[bool]) -> list[int]:
     """Return the nodes of `numbers` that are pending, and clear their flags in `pending`."""
     taken = [number for number in numbers if pending[number]]
     for number in taken:
@@ -319,10 +319,10 @@ def _batches(graph: Graph, alive: Sequence[bool], phase: Sequence[int]) -> list[
             angles = levels.setdefault((phase[number], depth[number]), {})
             angles.setdefault(operands[0], []).append((number, part))
             depth[number] += 1
-    return [_split(levels[level]) for level in sorted(levels)]
+    return [_lane_batches(levels[level]) for level in sorted(levels)]
 
 
-def _split(angles: dict[int, list[tuple[int, int]]]) -> list[SinCosGroup]:
+def _lane_batches(angles: dict[int, list[tuple[int, int]]]) -> list[SinCosGroup]:
     """Return batches of up to LANES angles.
 
     `angles` maps the node of an angle to its results: node and 0 for the sine, LANES for the
@@ -406,7 +406,7 @@ def slots(
             elif n in home:
                 outputs.setdefault(n, []).append((k, element, n))
             elif n not in elsewhere:
-                copied.setdefault(_first(graph, n, begins or {}), []).append((k, element, n))
+                copied.setdefault(_first_block(graph, n, begins or {}), []).append((k, element, n))
 
     def place(n: int) -> int:
         if n in of:
@@ -486,7 +486,7 @@ def _places(
     return of, count
 
 
-def _first(graph: Graph, number: int, begins: Mapping[int, int]) -> int:
+def _first_block(graph: Graph, number: int, begins: Mapping[int, int]) -> int:
     """Return the index of the first block in which the input or constant `number` is known.
 
     `begins` is as in `slots`.
@@ -555,7 +555,7 @@ class BlockCode:
         own = Slots(table.texts, {}, {}, self.where.count, 0)
         return "\n".join(
             [
-                f"/* {count}{self._ends(repeat)}. */",
+                f"/* {count}{self._access_comment(repeat)}. */",
                 *_table(index, f"{name}_at", places),
                 *_table(self.scalar, f"{name}_of", constants),
                 f"static NOINLINE void {name}"
@@ -572,7 +572,7 @@ class BlockCode:
         """Return the name of the C function of a recurring sequence."""
         return f"{self.graph.name}_repeat{list(self.where.tables).index(repeat)}"
 
-    def _ends(self, repeat: Repeat) -> str:
+    def _access_comment(self, repeat: Repeat) -> str:
         """Return comment text that names the inputs and outputs that a sequence accesses."""
         taken = {n for column in repeat.taken for n in column.nodes}
         given = {n for column in repeat.given for n in column.nodes}
@@ -601,7 +601,7 @@ class BlockCode:
             for k, place in self.where.inputs.items()
         ]
 
-    def _last(self) -> list[str]:
+    def _output_lines(self) -> list[str]:
         """Return C lines that store the output elements that recurring sequences computed."""
         lines: list[str] = []
         for k, leaving in groupby(self.where.last, lambda leaving: leaving[0]):
@@ -649,7 +649,7 @@ class BlockCode:
             for n in gives(step):
                 lines += [f"  w[{of[n]}] = t{n};"] if n in of else []
                 lines += self._stores(self.where.outputs.get(n, ()))
-        return lines + (self._last() if number == self.where.blocks - 1 else [])
+        return lines + (self._output_lines() if number == self.where.blocks - 1 else [])
 
     def _loads(self, step: Step, known: set[int]) -> list[str]:
         """Return C lines that load the operands of a step; nodes in `known` are loaded already."""
@@ -839,7 +839,7 @@ class LaneCode(BlockCode):
         if op in VECTORS:
             text = f"{VECTORS[op]}({', '.join(map(self._vector, operands))})"
         else:
-            text = expression(self.graph, step, self._write)
+            text = expression(self.graph, step, self._operand)
         return [f"  const mbs_lanes t{step} = {text};"]
 
     def _sincos(self, batch: SinCosGroup, lane: int) -> list[str]:
@@ -861,10 +861,10 @@ class LaneCode(BlockCode):
 
     def _vector(self, number: int) -> str:
         """Return the C text of node `number` as a SIMD vector."""
-        text = self._write(self.graph, number)
+        text = self._operand(self.graph, number)
         return f"mbs_all({text})" if self._is_scalar(number) else text
 
-    def _write(self, graph: Graph, number: int) -> str:
+    def _operand(self, graph: Graph, number: int) -> str:
         """Return the C text of node `number` as an operand, a vector or a scalar."""
         node = graph.nodes[number]
         if node.op == casadi.OP_INPUT and not self.shared[node.args[0]]:

@@ -272,11 +272,11 @@ def _compile(compiler: Compiler, arguments: Sequence[str], sources: Sequence[Pat
     if answer.returncode != 0:
         if os.strerror(errno.ENOSPC) in answer.stderr:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        complaint = _complaint(answer.stderr)
+        complaint = _main_error(answer.stderr)
         raise CompilerError(f"{program} refused {names}: {complaint.strip()[:500]}")
 
 
-def _complaint(stderr: str) -> str:
+def _main_error(stderr: str) -> str:
     """Return the most informative line of the error output of a compiler or linker."""
     lines = stderr.splitlines()
     found = (s for word in ("undefined reference", "error") for s in lines if word in s)
@@ -437,7 +437,7 @@ def known_library(files: Mapping[str, str], flags: Sequence[str] = FLAGS) -> Pat
         CompilerError: there is no compiler.
     """
     compiler, flags = find_compiler(), chosen_flags(flags)
-    return _known(cache_dir(), _key(files, flags, compiler), LIBRARY_SUFFIX)
+    return _undamaged_file(cache_dir(), _key(files, flags, compiler), LIBRARY_SUFFIX)
 
 
 _TOGETHER = "all_of_them.c"
@@ -455,7 +455,7 @@ def _library_in(
 ) -> Path:
     """Return the library of `cached_library` in a cache folder; compile it if it is missing."""
     key = _key(files, flags, compiler)
-    known = _known(folder, key, suffix)
+    known = _undamaged_file(folder, key, suffix)
     if known is not None:
         return known
     with tempfile.TemporaryDirectory(dir=folder, prefix=BUILD, ignore_cleanup_errors=True) as name:
@@ -473,10 +473,10 @@ def _library_in(
             parts[-1].write_text("".join(lines), encoding="utf-8")
         output = build / f"library{suffix}"
         library = compile_library(parts, [build], flags, output, compiler=compiler)
-        return _install(library, folder / f"{key}-{_sum_of(library)}{suffix}")
+        return _install(library, folder / f"{key}-{_checksum(library)}{suffix}")
 
 
-def _known(folder: Path, key: str, suffix: str) -> Path | None:
+def _undamaged_file(folder: Path, key: str, suffix: str) -> Path | None:
     """Return an undamaged file of a cache folder with this key and suffix, or None."""
     found = sorted(folder.glob(f"{key}-*{suffix}"))
     return next((known for known in found if is_whole(known)), None)
@@ -497,12 +497,12 @@ def _common_object(
         read += [n for n in _INCLUDE.findall(files[name]) if n in files and n not in read]
     chosen = [*(flag for flag in flags if flag not in ("-shared", "-s")), "-c"]
     key, folder = _key({name: files[name] for name in read}, chosen, compiler), build.parent
-    known = _known(folder, key, ".o")
+    known = _undamaged_file(folder, key, ".o")
     if known is not None:
         return known
     source, output = build / file, build / f"{Path(file).stem}.o"
     _compile(compiler, [*chosen, f"-I{build}", str(source), "-o", str(output)], [source])
-    return _install(output, folder / f"{key}-{_sum_of(output)}.o")
+    return _install(output, folder / f"{key}-{_checksum(output)}.o")
 
 
 def is_whole(library: Path) -> bool:
@@ -521,10 +521,10 @@ def is_whole(library: Path) -> bool:
 @functools.lru_cache(maxsize=1024)
 def _checked(library: Path, changed: int, size: int) -> bool:
     """Whether a cached file matches its hash; cached by time of change [ns] and size [bytes]."""
-    return library.stem.rpartition("-")[2] == _sum_of(library)
+    return library.stem.rpartition("-")[2] == _checksum(library)
 
 
-def _sum_of(library: Path) -> str:
+def _checksum(library: Path) -> str:
     """Return the first 16 digits of the SHA-256 hash of a file."""
     with library.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()[:16]

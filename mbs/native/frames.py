@@ -180,7 +180,7 @@ class Memory:
     @property
     def size(self) -> int:
         """Total length of the work space in doubles."""
-        return self.slots + self._lost + (self._starts[-1] + LANES if self._sizes else 0)
+        return self.slots + self._omitted_length + (self._starts[-1] + LANES if self._sizes else 0)
 
     def buffer(self, number: int) -> int:
         """Return the index in the C array `out` of the buffer of a graph input that a map computes.
@@ -203,7 +203,7 @@ class Memory:
         taken = len(self.graph.outputs) - n_out
         inputs = [f"arg[{k}] ? arg[{k}] : zeros" for k in range(n_in)] + places[taken:]
         outputs = [f"res[{k}] ? res[{k}] : w + {self.slots}" for k in range(n_out)] + places
-        base = f"  double *const base = mbs_aligned(w + {self.slots + self._lost});"
+        base = f"  double *const base = mbs_aligned(w + {self.slots + self._omitted_length});"
         lanes = f"  mbs_lanes *const lanes = (mbs_lanes *)(base + {self._starts[-1]});"
         return [
             f"  static const double zeros[{most or 1}] = {{0}};",
@@ -213,7 +213,7 @@ class Memory:
         ]
 
     @property
-    def _lost(self) -> int:
+    def _omitted_length(self) -> int:
         """Length of the part that receives omitted outputs, in doubles."""
         return max((self.function.nnz_out(k) for k in range(self.function.n_out())), default=0)
 
@@ -250,14 +250,16 @@ def function_table(function: Function, work: int | str) -> str:
     lines = [
         f"EXPORT casadi_int {name}_n_in(void) {{ return {n_in}; }}",
         f"EXPORT casadi_int {name}_n_out(void) {{ return {n_out}; }}",
-        _choose("double ", f"{name}_default_in", _defaults(function)),
-        _choose("const char *", f"{name}_name_in", [f'"{s}"' for s in function.name_in()]),
-        _choose("const char *", f"{name}_name_out", [f'"{s}"' for s in function.name_out()]),
+        _switch_function("double ", f"{name}_default_in", _defaults(function)),
+        _switch_function("const char *", f"{name}_name_in", [f'"{s}"' for s in function.name_in()]),
+        _switch_function(
+            "const char *", f"{name}_name_out", [f'"{s}"' for s in function.name_out()]
+        ),
     ]
     for kind, patterns in tables.items():
         names = [f"{name}_{kind}_{k}" for k in range(len(patterns))]
         lines += [_table(*row) for row in zip(names, patterns, strict=True)]
-        lines.append(_choose(shape, f"{name}_{kind}", names))
+        lines.append(_switch_function(shape, f"{name}_{kind}", names))
     return "\n".join([*lines, _work(name, n_in, n_out, work)])
 
 
@@ -267,7 +269,7 @@ def _defaults(function: Function) -> list[str]:
     return [repr(x) if math.isfinite(x) else "NAN" for x in values]
 
 
-def _choose(kind: str, name: str, answers: Sequence[str]) -> str:
+def _switch_function(kind: str, name: str, answers: Sequence[str]) -> str:
     """Return a C function of type `kind` from i to `answers[i]`, and to 0 for other values of i."""
     cases = "".join(f" case {k}: return {answer};" for k, answer in enumerate(answers))
     return f"EXPORT {kind}{name}(casadi_int i) {{ switch (i) {{{cases} default: return 0; }} }}"

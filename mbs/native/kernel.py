@@ -249,7 +249,7 @@ def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: i
     """
     name = function.name()
     late = {port: k + 1 for k, m in enumerate(maps) for port in m.outputs}
-    pieces = _pieces(graph, late, len(maps), block)
+    pieces = _blocks_between_maps(graph, late, len(maps), block)
     begins = [0, *accumulate(map(len, pieces))]
     every = [steps for some in pieces for steps in some]
     columns, elsewhere = direct_columns(graph, maps, function.n_out())
@@ -274,7 +274,9 @@ def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: i
     ]
 
 
-def _pieces(graph: Graph, late: dict[int, int], maps: int, block: int) -> list[list[list[Item]]]:
+def _blocks_between_maps(
+    graph: Graph, late: dict[int, int], maps: int, block: int
+) -> list[list[list[Item]]]:
     """Return the blocks before the first map, between the first and the second map, and so on.
 
     `late` maps a graph input to the number of maps after which it is known.
@@ -413,16 +415,16 @@ def indexed_library(key: str, make: Callable[[], Path | None]) -> Path | None:
     """
     folder = cache_dir()
     entry = folder / f"{key}{_SUFFIX}"
-    known = _entry(entry)
+    known = _indexed_library(entry)
     if known is not None:
         return known
     library = make()
     if library is not None and library.parent == folder:
-        _write(entry, library.name)
+        _write_entry(entry, library.name)
     return library
 
 
-def _entry(entry: Path) -> Path | None:
+def _indexed_library(entry: Path) -> Path | None:
     """Return the library that an index entry names; None if a file is missing or damaged."""
     try:
         name = entry.read_text("utf-8")
@@ -432,7 +434,7 @@ def _entry(entry: Path) -> Path | None:
         return None
 
 
-def _write(entry: Path, name: str) -> None:
+def _write_entry(entry: Path, name: str) -> None:
     """Write the library name to an index entry; if that fails, the C text is generated again."""
     try:
         with tempfile.TemporaryDirectory(dir=entry.parent, prefix=BUILD) as folder:
@@ -448,14 +450,14 @@ def _index_key(text: str, options: str) -> str:
     compiler = find_compiler()
     facts = (casadi.CasadiMeta.version(), *compiler.command, compiler.version, processor())
     digest = hashlib.sha256()
-    for part in (*facts, *chosen_flags(FAST_FLAGS), _writer(), options, text):
+    for part in (*facts, *chosen_flags(FAST_FLAGS), _generator_hash(), options, text):
         digest.update(part.encode())
         digest.update(b"\0")
     return digest.hexdigest()[:40]
 
 
 @functools.cache
-def _writer() -> str:
+def _generator_hash() -> str:
     """Return a hash of the files of the code generator, as part of cache keys."""
     digest = hashlib.sha256()
     for package in ("mbs.native", "mbs.operations"):

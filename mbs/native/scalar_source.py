@@ -73,7 +73,7 @@ def plain_source(
     """
     texts, most = [HEAD], WorkSize()
     for function in functions:
-        lines, work = _hosted(function, "", block, least)
+        lines, work = _null_safe_lines(function, "", block, least)
         texts += [*lines, ""]
         most = most.covering(work)
     return "\n".join(texts), most
@@ -90,7 +90,7 @@ def external_source(functions: Iterable[Function]) -> str:
     """
     texts = [HEAD + EXPORT]
     for function in functions:
-        lines, work = _hosted(function, "EXPORT ", BLOCK, LEAST)
+        lines, work = _null_safe_lines(function, "EXPORT ", BLOCK, LEAST)
         texts += [*lines, function_table(function, work.w), ""]
     return "\n".join(texts)
 
@@ -146,7 +146,9 @@ def _body(function: Function, real: Real, block: int, least: int) -> GraphCode:
     return GraphCode(function.name(), code, pieces)
 
 
-def _hosted(function: Function, linkage: str, block: int, least: int) -> tuple[list[str], WorkSize]:
+def _null_safe_lines(
+    function: Function, linkage: str, block: int, least: int
+) -> tuple[list[str], WorkSize]:
     """Return the C lines of a Function whose arguments may be NULL, and its work sizes.
 
     `linkage` is the text before the type; `block` and `least` are as in `plain_source`.

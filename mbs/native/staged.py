@@ -128,7 +128,7 @@ class _Trace:
         if function.is_a("MXFunction"):
             return self._interpret(function, arguments)
         if function.is_a("SXFunction"):
-            return [SX(y) for y in function.call([_whole(x) for x in arguments])]
+            return [SX(y) for y in function.call([_as_matrix(x) for x in arguments])]
         raise ModelError(f"{function.name()} is not made of scalar operations")
 
     def _interpret(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
@@ -139,12 +139,12 @@ class _Trace:
             op, node = function.instruction_id(k), function.instruction_MX(k)
             source, target = function.instruction_input(k), function.instruction_output(k)
             if op == casadi.OP_OUTPUT:
-                place, value = node.info(), _whole(work[source[0]])
+                place, value = node.info(), _as_matrix(work[source[0]])
                 for j in range(value.nnz()):
                     results[place["ind"]][place["offset"] + j] = SX(value.nz[j])
                 continue
             if op == casadi.OP_INPUT:
-                outputs: Sequence[_Value] = [_part(arguments, node)]
+                outputs: Sequence[_Value] = [_input_part(arguments, node)]
             else:
                 outputs = self._step(op, node, [work[n] if n >= 0 else SX(0) for n in source])
             work.update(zip(target, outputs, strict=True))
@@ -160,9 +160,9 @@ class _Trace:
         if op == casadi.OP_CALL:
             return self.called(node.which_function(), arguments)
         if op == casadi.OP_HORZREPMAT:
-            value = _whole(arguments[0])
+            value = _as_matrix(arguments[0])
             return [_Tiled(value, node.shape[1] // value.shape[1])]
-        values = [_whole(x) for x in arguments]
+        values = [_as_matrix(x) for x in arguments]
         if op in ELEMENTWISE:
             return [SX.binary(op, *values) if len(values) == 2 else SX.unary(op, *values)]
         if op in _SPLITS:
@@ -186,7 +186,7 @@ class _Trace:
             if isinstance(x, _Tiled) and shared[k]:
                 self.arguments.append(_elements(casadi.project(x.value, column.sparsity_in(k))))
             else:
-                value = casadi.project(_whole(x), function.sparsity_in(k))
+                value = casadi.project(_as_matrix(x), function.sparsity_in(k))
                 self.arguments.append(_in_lanes(value, column.nnz_in(k), columns))
         results = []
         for k in range(column.n_out()):
@@ -198,18 +198,18 @@ class _Trace:
         return results
 
 
-def _whole(value: _Value) -> SX:
+def _as_matrix(value: _Value) -> SX:
     """Return a value as a matrix, with repetitions written out."""
     return casadi.repmat(value.value, 1, value.times) if isinstance(value, _Tiled) else value
 
 
-def _part(arguments: Sequence[_Value], node: MX) -> _Value:
+def _input_part(arguments: Sequence[_Value], node: MX) -> _Value:
     """Return the argument, or the part of an argument, that an input node of MX reads."""
     place, pattern = node.info(), node.sparsity()
     argument = arguments[place["ind"]]
     if isinstance(argument, _Tiled) and argument.value.shape[0] == pattern.shape[0]:
         return argument
-    value, first = _whole(argument), place["offset"]
+    value, first = _as_matrix(argument), place["offset"]
     return SX(pattern, _elements(value)[first : first + pattern.nnz()])
 
 

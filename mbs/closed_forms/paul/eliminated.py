@@ -44,10 +44,10 @@ def eliminated(stage: PaulStage) -> Iterator[Candidate]:
             others = tuple(v for v in variables if v is not variable)
             if variable.prismatic or len(columns(others)) > _MOST:
                 continue
-            yield from _of(stage, inside, variable, others)
+            yield from _steps_for(stage, inside, variable, others)
 
 
-def _of(
+def _steps_for(
     stage: PaulStage, rows: list[Equation], variable: Variable, others: Variables
 ) -> Iterator[Candidate]:
     """Yield steps that solve `variable` from `rows`, with the variables `others` eliminated."""
@@ -67,7 +67,7 @@ def _of(
         cost = float(sum(row.cost for row in chosen))
 
         def build(chosen: tuple[Equation, ...] = chosen) -> SequenceStep:
-            return _built(stage, chosen, variable, others)
+            return _determinant_step(stage, chosen, variable, others)
 
         # rank between equations in one unknown (4, 5) and pairs of equations (6)
         order = 5.5 if variable.single else 5.7
@@ -86,7 +86,7 @@ def _minors(K: Matrix) -> Matrix:
     return np.stack(values, axis=-1)
 
 
-def _built(
+def _determinant_step(
     stage: PaulStage, rows: tuple[Equation, ...], variable: Variable, others: Variables
 ) -> SequenceStep:
     """Return the step of X cos q + Y sin q = Z, whose coefficients are determinants.

@@ -115,7 +115,7 @@ def equations(knowledge: KnownFrames, most: int = PRODUCTS) -> tuple[Equation, .
         for row, terms in simple_rows(split, prismatic, most):
             new = _equation(row, terms, prismatic, sums)
             if new is not None:
-                found.setdefault(_mark(new), []).append(new)
+                found.setdefault(_fingerprint(new), []).append(new)
     return tuple(
         equation
         for equal in found.values()
@@ -123,7 +123,7 @@ def equations(knowledge: KnownFrames, most: int = PRODUCTS) -> tuple[Equation, .
     )
 
 
-def _mark(equation: Equation) -> object:
+def _fingerprint(equation: Equation) -> object:
     """Return a hashable value that is equal for equations that are multiples of each other."""
     keys = sorted(equation.parts)
     samples = max(len(part.values) for part in equation.parts.values())
@@ -156,7 +156,9 @@ def _equation(
     reduced = dict[Members, tuple[Values, list[Source]]]()
     for term, given in terms.items():
         turns = any(k not in prismatic for k, _ in term)
-        rest, source, values = _fold(term, given * (2 if turns else 1), prismatic, sums)
+        rest, source, values = _without_known_sums(
+            term, given * (2 if turns else 1), prismatic, sums
+        )
         before = reduced.get(rest)
         if before is None:
             reduced[rest] = values, [source]
@@ -178,7 +180,7 @@ def _equation(
     return equation if len(variables) <= PRODUCTS or equation.linear else None
 
 
-def _fold(
+def _without_known_sums(
     term: Members,
     values: Values,
     prismatic: frozenset[int],
@@ -289,7 +291,7 @@ def factor(knowledge: KnownFrames, matrices: RingMatrices, equation: Equation, k
         return total
     sums = [value for _, value, _ in knowledge.open_sums()]
     for source in part.sources:
-        own = _own(knowledge, matrices, equation, source.term)
+        own = _single_term(knowledge, matrices, equation, source.term)
         if source.known:
             angle = sum((multiple * sums[number] for number, multiple in source.known), SX(0))
             own = _rotate(own, angle, source.conjugate)
@@ -305,7 +307,7 @@ def _rotate(own: Factor, angle: SX, conjugate: bool) -> Factor:
     return Factor(SX(X), SX(-Y if conjugate else Y))
 
 
-def _own(
+def _single_term(
     knowledge: KnownFrames, matrices: RingMatrices, equation: Equation, term: Members
 ) -> Factor:
     """Return X and Y of the product of joint powers `term` in an equation."""
@@ -321,7 +323,7 @@ def _own(
             _coefficient(knowledge, matrices, equation.row, prismatic | cosines),
             _coefficient(knowledge, matrices, equation.row, prismatic | with_sine),
         )
-    return _mix(knowledge, matrices, equation.row, (prismatic, angles))
+    return _combined_term(knowledge, matrices, equation.row, (prismatic, angles))
 
 
 def _has_partner(
@@ -343,7 +345,7 @@ def _has_partner(
     )
 
 
-def _mix(
+def _combined_term(
     knowledge: KnownFrames,
     matrices: RingMatrices,
     row: SplitRow,
@@ -378,13 +380,13 @@ def _coefficient(
     """
     total = SX(0)
     for direction in (1, -1):
-        steps = list(_steps(row, len(matrices.on), direction))
+        steps = list(_path(row, len(matrices.on), direction))
         if all(("joint", k) in steps for k in chosen):
-            total += direction * _along(knowledge, matrices, (row, steps, direction), chosen)
+            total += direction * _path_element(knowledge, matrices, (row, steps, direction), chosen)
     return SX(total)
 
 
-def _steps(row: SplitRow, n: int, direction: int) -> Iterator[tuple[str, int]]:
+def _path(row: SplitRow, n: int, direction: int) -> Iterator[tuple[str, int]]:
     """Yield joints and known transforms between two frames, around the loop in one direction."""
     point = row.start
     while point != row.end:
@@ -393,7 +395,7 @@ def _steps(row: SplitRow, n: int, direction: int) -> Iterator[tuple[str, int]]:
         point = (point + direction) % (2 * n)
 
 
-def _along(
+def _path_element(
     knowledge: KnownFrames,
     matrices: RingMatrices,
     path: tuple[SplitRow, list[tuple[str, int]], int],
@@ -411,14 +413,14 @@ def _along(
         if kind == "gap":
             matrix = (matrices.on if direction > 0 else matrices.back)[k]
         else:
-            matrix = _joint(knowledge, k, chosen.get(k, 0), direction)
+            matrix = _joint_matrix(knowledge, k, chosen.get(k, 0), direction)
         r = SX(casadi.sparsify(casadi.mtimes(r, matrix)))
         if r.nnz() == 0:
             return SX(0)
     return SX(r[0, 0] + r[0, 6 + row.seed])
 
 
-def _joint(knowledge: KnownFrames, k: int, number: int, direction: int) -> SX:
+def _joint_matrix(knowledge: KnownFrames, k: int, number: int, direction: int) -> SX:
     """Return the matrix (15, 15) of joint k at its known position.
 
     For an unknown joint, it is the basis matrix with index `number`.

@@ -43,12 +43,12 @@ def linear(stage: PaulStage) -> Iterator[Candidate]:
         inside = [e for e in rows if set(e.variables) <= set(variables)]
         sums = any(not variable.single for variable in variables)
         order = 3.0 if sums else float(min(len(variables), 2))
-        for chosen, rank in _best(inside, variables):
+        for chosen, rank in _best_rows(inside, variables):
 
             def build(
                 chosen: tuple[Equation, ...] = chosen, v: Variables = variables
             ) -> SequenceStep:
-                return _built(stage, chosen, v)
+                return _cramer_step(stage, chosen, v)
 
             yield Candidate((order, *rank), variables, build)
 
@@ -113,7 +113,7 @@ def row_factors(stage: PaulStage, equation: Equation, variables: Variables) -> l
     return [*factors, stage.factor(equation, (0,) * len(equation.variables)).X]
 
 
-def _best(
+def _best_rows(
     rows: list[Equation], variables: Variables
 ) -> list[tuple[tuple[Equation, ...], tuple[float, ...]]]:
     """Return the best selections of rows that determine the variables, with their sort keys.
@@ -140,12 +140,14 @@ def _best(
     return sorted(choices, key=lambda choice: choice[1])[:_CHOICES]
 
 
-def _built(stage: PaulStage, rows: tuple[Equation, ...], variables: Variables) -> SequenceStep:
+def _cramer_step(
+    stage: PaulStage, rows: tuple[Equation, ...], variables: Variables
+) -> SequenceStep:
     """Return the step that solves the rows for the variables by Cramer's rule."""
     table = [row_factors(stage, row, variables) for row in rows]
     A = casadi.vertcat(*(casadi.horzcat(*row[:-1]) for row in table))
     b = casadi.vertcat(*(-row[-1] for row in table))
-    named, equation = _text(stage, table, variables)
+    named, equation = _equation_text(stage, table, variables)
     D, solved = _cramer(A, b)
     values, regular, at = dict[int, SX](), list[SX](), 0
     power = sum(row.row.power for row in rows) - sum(variable.prismatic for variable in variables)
@@ -158,12 +160,12 @@ def _built(stage: PaulStage, rows: tuple[Equation, ...], variables: Variables) -
         at += 1 if variable.prismatic else 2
     if not D.is_constant():
         regular.append(SX((D / stage.matrices.length**power) ** 2))
-    kind = _kind(variables)
+    kind = _type_name(variables)
     found = Found(values, (), tuple(regular), named)
     return step(stage.knowledge.problem, kind, equation, {}, found)
 
 
-def _kind(variables: Variables) -> str:
+def _type_name(variables: Variables) -> str:
     """Return the type of the equations: "linear" for several unknowns, else "type 1" or "type 3".
 
     Type 1 has a single length, type 3 a single angle.
@@ -184,7 +186,7 @@ def _cramer(A: SX, b: SX) -> tuple[SX, list[SX]]:
     return SX(casadi.det(A)), numerators
 
 
-def _text(
+def _equation_text(
     stage: PaulStage, table: list[list[SX]], variables: Variables
 ) -> tuple[dict[str, SX], str]:
     """Return the named coefficients of linear equations, and the equations as text.

@@ -14,7 +14,7 @@ from mbs.closed_forms.paul.eliminated import eliminated
 from mbs.closed_forms.paul.equation import PRODUCTS, equations, ring_matrices
 from mbs.closed_forms.paul.linear import linear
 from mbs.closed_forms.paul.one_unknown import Candidate, PaulStage, one_unknown
-from mbs.closed_forms.paul.splits import KnownFrames, Variable, beginning
+from mbs.closed_forms.paul.splits import KnownFrames, Variable, nothing_known
 from mbs.closed_forms.paul.two_unknowns import two_unknowns
 from mbs.closed_forms.sequence import ZERO, Found, Problem, SequenceStep, StepSequence, step
 from mbs.components.joints import Motion
@@ -33,7 +33,7 @@ def sums(stage: PaulStage) -> Iterator[Candidate]:
     Args:
         stage: known quantities and equations.
     """
-    for rest, value, text in _alone(stage):
+    for rest, value, text in _isolated_angles(stage):
 
         def build(rest: Variable = rest, value: SX = value, text: str = text) -> SequenceStep:
             turns = casadi.floor((value + casadi.pi) / (2 * casadi.pi))
@@ -43,7 +43,7 @@ def sums(stage: PaulStage) -> Iterator[Candidate]:
         yield Candidate((0.0,), (rest,), build)
 
 
-def _alone(stage: PaulStage) -> Iterator[tuple[Variable, SX, str]]:
+def _isolated_angles(stage: PaulStage) -> Iterator[tuple[Variable, SX, str]]:
     """Yield each single angle that known sums determine, its value, and the equation."""
     knowledge = stage.knowledge
     opened = [
@@ -55,19 +55,19 @@ def _alone(stage: PaulStage) -> Iterator[tuple[Variable, SX, str]]:
     yield from (own for own in opened if own[0].single)
     for (first, a, text), (second, b, other) in combinations(opened, 2):
         for sense in (1, -1):
-            rest = _combine(first, second, sense)
+            rest = _combined_signs(first, second, sense)
             if len(rest) == 1:
                 ((k, sign),) = rest.items()
                 value = SX(a + sense * b) / sign
-                yield _angle(knowledge, k), value, f"{text}, {other}"
+                yield _joint_variable(knowledge, k), value, f"{text}, {other}"
 
 
-def _angle(knowledge: KnownFrames, k: int) -> Variable:
+def _joint_variable(knowledge: KnownFrames, k: int) -> Variable:
     """Return the variable of joint k: its angle or its displacement."""
     return Variable(not knowledge.ring.joints[k].is_rotational, ((k, 1),))
 
 
-def _combine(first: Variable, second: Variable, sense: int) -> dict[int, int]:
+def _combined_signs(first: Variable, second: Variable, sense: int) -> dict[int, int]:
     """Return the signs of the joints in the sum first + sense * second, by joint index.
 
     Empty if a coefficient is not 1 or -1.
@@ -75,10 +75,14 @@ def _combine(first: Variable, second: Variable, sense: int) -> dict[int, int]:
     total = dict(first.members)
     for k, sign in second.members:
         total[k] = total.get(k, 0) + sense * sign
-    return {k: sign for k, sign in total.items() if sign in (1, -1)} if _unit(total) else {}
+    return (
+        {k: sign for k, sign in total.items() if sign in (1, -1)}
+        if _has_unit_coefficients(total)
+        else {}
+    )
 
 
-def _unit(total: dict[int, int]) -> bool:
+def _has_unit_coefficients(total: dict[int, int]) -> bool:
     """Whether all coefficients of a sum of angles, by joint, are -1, 0 or 1."""
     return all(abs(sign) <= 1 for sign in total.values())
 
@@ -103,11 +107,11 @@ def at_feet(problem: Problem) -> Ring:
     for k in range(len(ring.joints) - 1):
         here, after = ring.joints[k], ring.joints[k + 1]
         if here.is_rotational and after.is_rotational and not ring.gaps[k + 1].pivots:
-            ring = _moved(problem, ring, k)
+            ring = _with_moved_frame(problem, ring, k)
     return ring
 
 
-def _moved(problem: Problem, ring: Ring, k: int) -> Ring:
+def _with_moved_frame(problem: Problem, ring: Ring, k: int) -> Ring:
     """Return the loop with the origin of joint k at the foot of the normal to the next axis.
 
     The same object is returned if the axes are parallel or the origin is there already.
@@ -152,7 +156,7 @@ def paul(problem: Problem) -> StepSequence:
         NoClosedForm: no supported equation solves the remaining joints. The message names them.
     """
     _require_simple(problem)
-    knowledge = beginning(problem, at_feet(problem))
+    knowledge = nothing_known(problem, at_feet(problem))
     loop, steps = ring_matrices(knowledge.ring), list[SequenceStep]()
     while knowledge.unknown:
         stage = PaulStage(knowledge, loop, equations(knowledge))
@@ -205,10 +209,10 @@ def _refusal(stage: PaulStage, steps: Sequence[SequenceStep]) -> str:
     left = ", ".join(knowledge.ring.joints[k].name for k in knowledge.unknown)
     given = ", ".join(name for step in steps for name in step.names)
     after = f" once {given} are known" if given else ""
-    return f"no equation gives {left}{after}: {_simplest(stage)}"
+    return f"no equation gives {left}{after}: {_simplest_text(stage)}"
 
 
-def _simplest(stage: PaulStage) -> str:
+def _simplest_text(stage: PaulStage) -> str:
     """Return text with the unknowns of the simplest equations that no solution type fits."""
     if not stage.equations:
         return "every equation of every split of the loop has more than two unknowns"

@@ -112,14 +112,16 @@ class KnownFrames:
 
     def open_sums(self) -> list[tuple[Variable, SX, Matrix]]:
         """Return the unknown part of each known sum: variable, expression, values at samples."""
-        return [_rest(self, *known) for known in self.sums]
+        return [_unknown_part(self, *known) for known in self.sums]
 
     def position(self, k: int) -> SX:
         """Return the symbol of the position of joint k."""
         return SX(self.problem.x[self.index(Variable(False, ((k, 1),)))])
 
 
-def _rest(knowledge: KnownFrames, variable: Variable, index: int) -> tuple[Variable, SX, Matrix]:
+def _unknown_part(
+    knowledge: KnownFrames, variable: Variable, index: int
+) -> tuple[Variable, SX, Matrix]:
     """Return the unknown part of a known sum of angles: variable, expression, values at samples.
 
     `variable` is the sum and `index` its index in x.
@@ -137,7 +139,7 @@ def _rest(knowledge: KnownFrames, variable: Variable, index: int) -> tuple[Varia
     return Variable(False, tuple(members)), value, at_samples
 
 
-def beginning(problem: Problem, ring: Ring) -> KnownFrames:
+def nothing_known(problem: Problem, ring: Ring) -> KnownFrames:
     """Return the known quantities at the start of a search: none.
 
     Args:
@@ -304,7 +306,7 @@ class _Pieces:
     """Matrices on w, or on directions only, from which the sides of equations are multiplied.
 
     `joints` are the unknown joints, `gaps` and `back` transforms between them in both directions,
-    `turns` and `turns_back` the joint factors of `_basis` in both directions.
+    `turns` and `turns_back` the joint factors of `_joint_factors` in both directions.
     """
 
     joints: list[int]
@@ -328,12 +330,12 @@ def splits(knowledge: KnownFrames) -> Iterator[FrameSplit]:
     for e, k in enumerate(whole.joints):
         prismatic = k in whole.prismatic
         for end in (2 * k, 2 * k + 1) if prismatic else (2 * k,):
-            yield from _of_end(whole, w, (e, prismatic), (end, 2))
+            yield from _splits_to(whole, w, (e, prismatic), (end, 2))
         for end in (2 * k,) if prismatic else (2 * k, 2 * k + 1):
-            yield from _of_end(directions, np.eye(3)[:, :2], (e, not prismatic), (end, 0))
+            yield from _splits_to(directions, np.eye(3)[:, :2], (e, not prismatic), (end, 0))
 
 
-def _of_end(
+def _splits_to(
     pieces: _Pieces, seed: Matrix, joint: tuple[int, bool], end: tuple[int, int]
 ) -> Iterator[FrameSplit]:
     """Yield the splits with one observed frame.
@@ -355,11 +357,11 @@ def _of_end(
             continue
         for column in range(seed.shape[1]):
             sides = (Side(s.joints, s.values[:, :, column]) for s in (side, other))
-            rows = _rows(axis, start, start // 2 in pieces.prismatic)
+            rows = _new_rows(axis, start, start // 2 in pieces.prismatic)
             yield FrameSplit(start, point, axis + column, rows, *sides)
 
 
-def _rows(axis: int, start: int, prismatic: bool) -> tuple[int, ...]:
+def _new_rows(axis: int, start: int, prismatic: bool) -> tuple[int, ...]:
     """Return the indices in w of the equations that are new if the reference frame is `start`.
 
     `axis` is the index of the observed axis, and `prismatic` the type of the joint at `start`.
@@ -380,16 +382,16 @@ def _walk_back(pieces: _Pieces, first: Tensor, e: int, turned: bool) -> Mapping[
     m, found = len(pieces.joints), dict[int, Side]()
     side = Side((), first[..., None])
     if turned:
-        side = _through(side, pieces.joints[e], pieces.turns[e])
+        side = _with_joint(side, pieces.joints[e], pieces.turns[e])
     for step in range(m):
         j = (e - step) % m
         found[2 * pieces.joints[j]] = side
-        side = _over(side, pieces.gaps[j])
+        side = _multiplied(side, pieces.gaps[j])
         before = (j - 1) % m
         found.setdefault(2 * pieces.joints[before] + 1, side)
         if len(side.joints) == _MOST:
             break
-        side = _through(side, pieces.joints[before], pieces.turns[before])
+        side = _with_joint(side, pieces.joints[before], pieces.turns[before])
     return found
 
 
@@ -401,27 +403,27 @@ def _walk_on(pieces: _Pieces, first: Tensor, e: int, turned: bool) -> Mapping[in
     m, found = len(pieces.joints), dict[int, Side]()
     side = Side((), first[..., None])
     if turned:
-        side = _through(side, pieces.joints[e], pieces.turns_back[e])
+        side = _with_joint(side, pieces.joints[e], pieces.turns_back[e])
     for step in range(m):
         j = (e + step) % m
         found[2 * pieces.joints[j] + 1] = side
         after = (j + 1) % m
-        side = _over(side, pieces.back[after])
+        side = _multiplied(side, pieces.back[after])
         found.setdefault(2 * pieces.joints[after], side)
         if len(side.joints) == _MOST:
             break
-        side = _through(side, pieces.joints[after], pieces.turns_back[after])
+        side = _with_joint(side, pieces.joints[after], pieces.turns_back[after])
     return found
 
 
-def _over(side: Side, matrix: Matrix) -> Side:
+def _multiplied(side: Side, matrix: Matrix) -> Side:
     """Return one side of the loop equation multiplied by a matrix."""
     S, d = matrix.shape[:2]
     values = matrix @ side.values.reshape(S, d, -1)
     return Side(side.joints, values.reshape(side.values.shape))
 
 
-def _through(side: Side, k: int, basis: Tensor) -> Side:
+def _with_joint(side: Side, k: int, basis: Tensor) -> Side:
     """Return the side multiplied by the factors (3, d, d) of a further unknown joint k."""
     S, d, columns, K = side.values.shape
     moved = basis[:, None] @ side.values.reshape(S, d, -1)
@@ -435,16 +437,16 @@ def _pieces(knowledge: KnownFrames, block: slice) -> _Pieces:
     The slice `block` selects rows and columns of the representation on w (15,).
     """
     joints = knowledge.unknown
-    gaps = [_merge(knowledge, k) for k in joints]
+    gaps = [_merged_transform(knowledge, k) for k in joints]
     ways = [represented(T)[:, block, block] for T in gaps]
     back = [represented(inverse(T))[:, block, block] for T in gaps]
-    turns = [_basis(knowledge, k, 1)[:, block, block] for k in joints]
-    turns_back = [_basis(knowledge, k, -1)[:, block, block] for k in joints]
+    turns = [_joint_factors(knowledge, k, 1)[:, block, block] for k in joints]
+    turns_back = [_joint_factors(knowledge, k, -1)[:, block, block] for k in joints]
     prismatic = frozenset(k for k in joints if not knowledge.ring.joints[k].is_rotational)
     return _Pieces(joints, ways, back, turns, turns_back, prismatic)
 
 
-def _merge(knowledge: KnownFrames, k: int) -> Matrix:
+def _merged_transform(knowledge: KnownFrames, k: int) -> Matrix:
     """Return the transform (samples, 4, 4) from the previous unknown joint to joint k."""
     ring, samples = knowledge.ring, knowledge.samples
     T, n = samples.gaps[:, k], len(ring.joints)
@@ -457,7 +459,7 @@ def _merge(knowledge: KnownFrames, k: int) -> Matrix:
     return T
 
 
-def _basis(knowledge: KnownFrames, k: int, direction: int) -> Tensor:
+def _joint_factors(knowledge: KnownFrames, k: int, direction: int) -> Tensor:
     """Return the factors (3, 15, 15) of e^-iq, 1, e^iq of joint k, or of r, 1, r^2.
 
     The direction is 1 along the loop and -1 against it.
@@ -525,7 +527,7 @@ def simple_rows(
         row = SplitRow(split.start, split.end, split.seed, split.rows[number])
         found = dict[Members, Values]()
         for side, table, mask, sign in zip(sides, tables, masks, (1, -1), strict=True):
-            _collect(found, (side, table.terms, mask[number]), rows[number], sign)
+            _collect_terms(found, (side, table.terms, mask[number]), rows[number], sign)
         yield row, found
 
 
@@ -540,7 +542,7 @@ def _counts(table: _Table, mask: NDArray[np.bool_]) -> NDArray[np.int_]:
     return np.array([count - together.sum(axis=1), count, weights @ table.long])
 
 
-def _collect(
+def _collect_terms(
     found: dict[Members, Values],
     source: tuple[Side, list[Members | None], NDArray[np.bool_]],
     row: int,

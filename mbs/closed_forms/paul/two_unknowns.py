@@ -131,7 +131,7 @@ def _candidate(stage: PaulStage, rows: tuple[Equation, Equation], stays: int) ->
     # rank 6 to 7.5, after single equations: quadratics before quartics, joints before sums of
     # joints
     rank = (6.0 + quartic + sums, unsteady(leading), cost)
-    return Candidate(rank, (pair.variable,), lambda: _built(stage, pair, shares))
+    return Candidate(rank, (pair.variable,), lambda: _pair_step(stage, pair, shares))
 
 
 def _common_power(forms: Sequence[_Form]) -> int | None:
@@ -197,14 +197,14 @@ def _resultant(forms: Sequence[_Form], power: int, prismatic: bool) -> Numbers:
     (x, y), (u, v) = forms[0].G[power], forms[1].G[power]
     n, a, b = x * x + y * y, u * x + v * y, v * x - u * y
     other = [a * one - n * two for one, two in zip(forms[0].B, forms[1].B, strict=True)]
-    squares = [_square(forms[0].B, prismatic), _square(other, prismatic)]
-    size = _size(forms[0].G, prismatic)
+    squares = [_squared(forms[0].B, prismatic), _squared(other, prismatic)]
+    size = _squared_magnitude(forms[0].G, prismatic)
     return [
         b * b * one + two - b * b * three for one, two, three in zip(*squares, size, strict=True)
     ]
 
 
-def _square(B: Numbers, prismatic: bool) -> Numbers:
+def _squared(B: Numbers, prismatic: bool) -> Numbers:
     """Return the coefficients of the square of B[0] + B[1] y + B[2] y^2 of a length y.
 
     For an angle, B multiplies 1, cos y, sin y, and the result multiplies 1, c, s, c2, s2.
@@ -215,13 +215,13 @@ def _square(B: Numbers, prismatic: bool) -> Numbers:
     return [z * z + (x * x + y * y) / 2, 2 * z * x, 2 * z * y, (x * x - y * y) / 2, x * y]
 
 
-def _size(G: list[Complex], prismatic: bool) -> Numbers:
+def _squared_magnitude(G: list[Complex], prismatic: bool) -> Numbers:
     """Return the coefficients of the squared magnitude of the complex form G in y.
 
-    They have the order of `_square`.
+    They have the order of `_squared`.
     """
     if prismatic:
-        parts = [_square([part[k] for part in G], True) for k in (0, 1)]
+        parts = [_squared([part[k] for part in G], True) for k in (0, 1)]
         return [one + two for one, two in zip(*parts, strict=True)]
     (a, b), (c, d), (e, f) = G
     first = (c * a + d * b + e * c + f * d, d * a - c * b + f * c - e * d)
@@ -230,7 +230,7 @@ def _size(G: list[Complex], prismatic: bool) -> Numbers:
     return [constant, 2 * first[0], -2 * first[1], 2 * second[0], -2 * second[1]]
 
 
-def _built(stage: PaulStage, pair: _Pair, shares: Any) -> SequenceStep:
+def _pair_step(stage: PaulStage, pair: _Pair, shares: Any) -> SequenceStep:
     """Return the step of a pair of equations; `shares` masks the nonzero coefficients."""
 
     def forms(row: Equation) -> _Form:
@@ -246,13 +246,13 @@ def _built(stage: PaulStage, pair: _Pair, shares: Any) -> SequenceStep:
     powers = [row.row.power for row in pair.rows]
     unit = 4 * powers[0] + 2 * powers[1] - (4 * pair.power if prismatic else 0)
     if np.any(shares[3:]):
-        return _quartic(stage, pair.variable, F, unit)
+        return _quartic_step(stage, pair.variable, F, unit)
     if prismatic:
-        return length_step(stage, pair.variable, F[2::-1], _kind(pair))
-    return angle_step(stage, pair.variable, (F[1], F[2], -F[0]), unit, _kind(pair))
+        return length_step(stage, pair.variable, F[2::-1], _type_name(pair))
+    return angle_step(stage, pair.variable, (F[1], F[2], -F[0]), unit, _type_name(pair))
 
 
-def _kind(pair: _Pair) -> str:
+def _type_name(pair: _Pair) -> str:
     """Return the type of a pair of equations in the table of Khalil: "type 4" to "type 8"."""
     goes = 1 - pair.stays
     factors = {abs(key[pair.stays]) for row in pair.rows for key in row.parts if key[goes]}
@@ -265,7 +265,7 @@ def _kind(pair: _Pair) -> str:
     return "type 6" if plain else "type 7"
 
 
-def _quartic(stage: PaulStage, variable: Variable, F: list[SX], unit: int) -> SequenceStep:
+def _quartic_step(stage: PaulStage, variable: Variable, F: list[SX], unit: int) -> SequenceStep:
     """Return the step of a quartic with coefficients F and four roots.
 
     `unit` is the power of a length that is the unit of F.

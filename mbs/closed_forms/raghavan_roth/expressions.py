@@ -80,7 +80,7 @@ def eliminated(A: SX, values: Array, columns: int, rank: int) -> tuple[SX, Array
         factors = values[:, :, c] / chosen[:, None, c]
         values = values - factors[:, :, None] * chosen[:, None]
         for k in np.nonzero(np.any(np.abs(factors) > _ZERO, axis=0))[0]:
-            rows[k] = _clear(rows[k] - rows[k][c] / pivot[c] * pivot, values[:, k])
+            rows[k] = _without_vanishing(rows[k] - rows[k][c] / pivot[c] * pivot, values[:, k])
     return SX(casadi.vertcat(*rows)[:, columns:]), values[:, :, columns:]
 
 
@@ -126,7 +126,7 @@ def _pivot(values: Array) -> tuple[int, int]:
     return int(r), int(c)
 
 
-def _clear(row: SX, values: Array) -> SX:
+def _without_vanishing(row: SX, values: Array) -> SX:
     """Return the row (1, n) with zeros for the entries whose values vanish at all samples."""
     cleared = SX(1, row.size2())
     for k in np.nonzero(np.any(np.abs(values) > _ZERO, axis=0))[0]:
@@ -136,20 +136,20 @@ def _clear(row: SX, values: Array) -> SX:
 
 def _right_side(elimination: Elimination, ways: Sequence[Pose]) -> SX:
     """Return the side of the loop equation with joints 1 and 2, (s, n1 n2), by their monomials."""
-    u = _pair(ways[5].inverse())[elimination.elements.tolist()]
-    once = _carry(elimination, ways[0].inverse(), _moved(elimination.first, u))
-    return _carry(elimination, ways[1].inverse(), _moved(elimination.second, once))
+    u = _origin_axis_products(ways[5].inverse())[elimination.elements.tolist()]
+    once = _carry(elimination, ways[0].inverse(), _products_with_parts(elimination.first, u))
+    return _carry(elimination, ways[1].inverse(), _products_with_parts(elimination.second, once))
 
 
 def _left_side(elimination: Elimination, ways: Sequence[Pose]) -> list[SX]:
     """Return the side of the loop equation with joints 3, 4 and 5, for each part of joint 3."""
-    w = _pair(ways[4])[elimination.elements.tolist()]
-    once = _carry(elimination, ways[3], _moved(elimination.fifth, w))
-    twice = _carry(elimination, ways[2], _moved(elimination.fourth, once))
-    return [_moved(part[None], twice) for part in elimination.third]
+    w = _origin_axis_products(ways[4])[elimination.elements.tolist()]
+    once = _carry(elimination, ways[3], _products_with_parts(elimination.fifth, w))
+    twice = _carry(elimination, ways[2], _products_with_parts(elimination.fourth, once))
+    return [_products_with_parts(part[None], twice) for part in elimination.third]
 
 
-def _moved(parts: Array, columns: SX) -> SX:
+def _products_with_parts(parts: Array, columns: SX) -> SX:
     """Return the products of the columns with each part, side by side."""
     return SX(casadi.horzcat(*(casadi.mtimes(_constant(part), columns) for part in parts)))
 
@@ -165,7 +165,7 @@ def _carry(elimination: Elimination, T: Pose, columns: SX) -> SX:
     return SX(casadi.mtimes(casadi.sparsify(rho[own, own]), columns))
 
 
-def _pair(T: Pose) -> SX:
+def _origin_axis_products(T: Pose) -> SX:
     """Return w (15, 1): 1 and the products of origin p and z axis of a pose."""
     p, z = T.p, T.R[:, 2]
     pp, pz = casadi.dot(p, p), casadi.dot(p, z)
@@ -268,7 +268,7 @@ def _loops(problem: Problem) -> list[_Loop]:
             prismatic = np.array([not joint.is_rotational for joint in own.joints])
             if prismatic[5]:
                 continue
-            ways = _numbers(problem, own, length)
+            ways = _numeric_transforms(problem, own, length)
             pencils = (pencil(elimination, ways) for elimination in eliminations(prismatic))
             found += [_Loop(own, one, length) for one in pencils if one.regularity > REGULAR]
     return found
@@ -282,7 +282,7 @@ def _length(problem: Problem) -> float:
     return float(2.0 ** round(np.log2(mean))) if mean > 0 else 1.0
 
 
-def _numbers(problem: Problem, ring: Ring, length: float) -> Array:
+def _numeric_transforms(problem: Problem, ring: Ring, length: float) -> Array:
     """Return the transforms (samples, 6, 4, 4) of a loop at the samples, in units of `length`."""
     gaps = (*ring.gaps[1:], ring.gaps[0])
     stacked = problem.at_samples(SX(casadi.vertcat(*(gap.pose.matrix for gap in gaps))))
@@ -300,23 +300,23 @@ def _characteristic(problem: Problem, loop: _Loop) -> Characteristic:
     count = len(elimination.third)
     parts = [dialytic(elimination, part) for part in casadi.horzsplit(E, E.size2() // count)]
     numbers = elimination.dialytic(np.stack(np.split(values, count, axis=-1), axis=1))
-    rows = independent_rows(_spread(numbers), elimination.size)
+    rows = independent_rows(_at_three_angles(numbers), elimination.size)
     return Characteristic(
-        _in_joint([part[rows, :] for part in parts], loop),
+        _in_joint_functions([part[rows, :] for part in parts], loop),
         joint.name,
-        _place(joint),
+        _unknown_index(joint),
         not joint.is_rotational,
         regularity(numbers[:, :, rows]),
     )
 
 
-def _spread(parts: Array) -> Array:
+def _at_three_angles(parts: Array) -> Array:
     """Return the matrices of parts (samples, n3, n, n) at three angles for each sample."""
     count = len(_ANGLES)
     return at(np.repeat(parts, count, axis=0), np.tile(np.array(_ANGLES), len(parts)))
 
 
-def _in_joint(parts: list[SX], loop: _Loop) -> tuple[SX, ...]:
+def _in_joint_functions(parts: list[SX], loop: _Loop) -> tuple[SX, ...]:
     """Return the parts as factors of 1, cos q, sin q, or of the powers of r in metres."""
     joint = loop.ring.joints[2]
     if joint.is_rotational:
@@ -326,7 +326,7 @@ def _in_joint(parts: list[SX], loop: _Loop) -> tuple[SX, ...]:
     return tuple((joint.sign / loop.length) ** k * part for k, part in enumerate(parts))
 
 
-def _place(joint: ChainJoint) -> int:
+def _unknown_index(joint: ChainJoint) -> int:
     """Return the index of a joint among the unknowns. Raise NoClosedForm if it has none."""
     if joint.index is None:
         raise NoClosedForm(f"joint {joint.name} has no place among the unknowns of the problem")

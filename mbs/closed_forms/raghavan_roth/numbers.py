@@ -33,7 +33,7 @@ def _skew(t: Array) -> Array:
     return np.array([[0, -t[2], t[1]], [t[2], 0, -t[0]], [-t[1], t[0], 0]])
 
 
-def _slope(t: Array) -> Array:
+def _rho_derivative(t: Array) -> Array:
     """Return the derivative (15, 15) of rho along a translation t."""
     X = np.zeros((SIZE, SIZE))
     X[1, 3:6] = 2 * t
@@ -45,7 +45,7 @@ def _slope(t: Array) -> Array:
     return X
 
 
-def _turning() -> Array:
+def _rho_rotation_parts() -> Array:
     """Return parts (3, 15, 15) of rho of a rotation about z: constant, cosine and sine."""
     Z = np.zeros((3, SIZE, SIZE))
     Z[0, range(3), range(3)] = 1.0
@@ -56,9 +56,9 @@ def _turning() -> Array:
 
 
 #: (3, 15, 15) derivatives X of rho along x, y, z. For a translation, rho is 1 + X + X X / 2.
-SLOPES = np.array([_slope(axis) for axis in np.eye(3)])
+SLOPES = np.array([_rho_derivative(axis) for axis in np.eye(3)])
 #: (3, 15, 15) parts of rho of a rotation q about z, with 1, cos q, sin q.
-TURN = _turning()
+TURN = _rho_rotation_parts()
 #: (3, 15, 15) parts of rho of a displacement r along z, with 1, r, r^2.
 SLIDE = np.array([np.eye(SIZE), SLOPES[2], 0.5 * SLOPES[2] @ SLOPES[2]])
 
@@ -294,7 +294,7 @@ def _elimination(prismatic: Joints, elements: NDArray[np.int64], raised: int) ->
     counts = [highest if slide else 3 for slide in slides]
     first, second = (back_parts(slides[k])[: counts[k]] for k in (0, 1))
     fourth, fifth = (half_parts(slides[k])[: counts[k]] for k in (3, 4))
-    third, unit = _third(slides[2], counts[2])
+    third, unit = _joint_3_parts(slides[2], counts[2])
     ends = (np.array([1.0, 0.0, 0.0 if slides[k] else 1.0])[: counts[k]] for k in (3, 4))
     one = np.einsum("k,i,j->kij", unit, *ends).reshape(len(unit), -1)
     own = (slice(None), elements[:, None], elements)
@@ -311,7 +311,7 @@ def _elimination(prismatic: Joints, elements: NDArray[np.int64], raised: int) ->
     )
 
 
-def _third(slides: bool, count: int) -> tuple[Array, Array]:
+def _joint_3_parts(slides: bool, count: int) -> tuple[Array, Array]:
     """Return first `count` parts of joint 3 for its `weights`, and coefficients of the number 1."""
     parts = motion_parts(slides)[:count]
     if not slides:
@@ -534,7 +534,7 @@ def pencil(elimination: Elimination, ways: Array) -> Pencil:
     rows, size = 2 * (len(elimination.elements) - 1 - rank), elimination.size
     if rows < size:
         return Pencil(elimination, rank, np.zeros((size, rows)), 0.0)
-    found = Pencil(elimination, rank, _mix(size, rows), 0.0)
+    found = Pencil(elimination, rank, _random_rows(size, rows), 0.0)
     return replace(found, regularity=regularity(found.matrices(ways)))
 
 
@@ -554,7 +554,7 @@ def regularity(M: Array) -> float:
     return float(np.min(np.median(conditions, axis=1)))
 
 
-def _mix(size: int, rows: int) -> Array:
+def _random_rows(size: int, rows: int) -> Array:
     """Return orthonormal rows (size, rows), random unless size and rows are equal."""
     if rows == size:
         return np.eye(size)
@@ -625,7 +625,7 @@ def prepare(arm: Arm) -> Prepared:
             f"arm {' '.join(arm.names)}: the general inverse geometric model is for six joints of"
             " which one is revolute at least; use method='search'"
         )
-    T = _reached(arm)
+    T = _generic_poses(arm)
     tried = [
         Prepared(loop, pencil(elimination, loop.all_ways(T)))
         for loop in arrangements(arm, _TRIAL_OFFSETS)
@@ -667,7 +667,7 @@ def for_poses(prepared: Prepared, T: Array) -> list[tuple[Prepared, Numbers]]:
     return [(every[k], np.flatnonzero(best == k)) for k in np.unique(best)]
 
 
-def _reached(arm: Arm) -> Array:
+def _generic_poses(arm: Arm) -> Array:
     """Return poses (2, 4, 4) of generic configurations of an arm [m]."""
     rng = np.random.default_rng(_PREPARE_SEED)
     turns = rng.uniform(-np.pi, np.pi, (_POSES, 6))
@@ -693,7 +693,7 @@ def complex_roots(M: Array) -> NDArray[np.complex128]:
     Args:
         M: (N, n3, n, n) parts of the matrices.
     """
-    offset, coefficients = _rotate(M / np.max(np.abs(M), axis=(1, 2, 3), keepdims=True))
+    offset, coefficients = _rotated_polynomial(M / np.max(np.abs(M), axis=(1, 2, 3), keepdims=True))
     x = np.linalg.eigvals(_companion(coefficients)).astype(complex)
     top, bottom = 1 + 1j * x, 1 - 1j * x
     size = np.log(np.abs(top) + NONZERO) - np.log(np.abs(bottom) + NONZERO)
@@ -734,7 +734,7 @@ def _regularities(M: Array) -> Array:
     return most
 
 
-def _rotate(M: Array) -> tuple[Array, Array]:
+def _rotated_polynomial(M: Array) -> tuple[Array, Array]:
     """Return offsets (N,) and coefficients (N, d + 1, n, n) of 1, x, .. for u = offset + 2 atan x.
 
     The offset is the one of eight at which the last coefficient, the matrix at x = infinity, is

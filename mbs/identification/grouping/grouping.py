@@ -107,7 +107,7 @@ class Grouping:
         total: dict[int, SX] = {}
         for column, coefficient in terms.items():
             for k, part in self.columns[column].items():
-                _add(total, k, coefficient * part)
+                _add_coefficient(total, k, coefficient * part)
         return total
 
     def replaced(self, dropped: int, terms: Terms) -> Grouping:
@@ -123,7 +123,7 @@ class Grouping:
             if dropped in column:
                 changed = {k: x for k, x in column.items() if k != dropped}
                 for k, part in equal.items():
-                    _add(changed, k, column[dropped] * part)
+                    _add_coefficient(changed, k, column[dropped] * part)
                 columns.append(changed)
             else:
                 columns.append(dict(column))
@@ -190,7 +190,7 @@ def coefficients(grouping: Grouping) -> Iterable[tuple[int, int, SX]]:
             yield k, number, coefficient
 
 
-def _add(total: dict[int, SX], k: int, part: SX) -> None:
+def _add_coefficient(total: dict[int, SX], k: int, part: SX) -> None:
     """Add `part` to the coefficient total[k] in place; delete it if the sum is zero."""
     if part.is_zero():
         return
@@ -219,28 +219,28 @@ def equation(name: str, terms: Mapping[str, SX]) -> str:
     """
     text = ""
     for parameter, coefficient in terms.items():
-        sign, factor = _sign(coefficient)
+        sign, factor = _sign_and_text(coefficient)
         term = parameter if factor == "1" else f"{factor}*{parameter}"
         lead = ("-" if sign == "-" else "") if not text else f" {sign} "
         text += lead + term
     return f"{name} = {text or '0'}"
 
 
-def _sign(coefficient: SX) -> tuple[str, str]:
+def _sign_and_text(coefficient: SX) -> tuple[str, str]:
     """Return the sign ("+" or "-") of a coefficient and the text of its magnitude."""
-    negative, size = _split(coefficient)
-    return "-" if negative else "+", _factor(size)
+    negative, size = _split_sign(coefficient)
+    return "-" if negative else "+", _factor_text(size)
 
 
-def _split(value: SX) -> tuple[bool, SX]:
+def _split_sign(value: SX) -> tuple[bool, SX]:
     """Return whether a coefficient is written with a minus sign, and the coefficient without it."""
     if value.is_constant():
         return float(value) < 0, SX(abs(float(value)))
     if value.is_op(casadi.OP_NEG):
-        negative, size = _split(value.dep(0))
+        negative, size = _split_sign(value.dep(0))
         return not negative, size
     if value.is_op(casadi.OP_MUL):
-        (left, first), (right, second) = _split(value.dep(0)), _split(value.dep(1))
+        (left, first), (right, second) = _split_sign(value.dep(0)), _split_sign(value.dep(1))
         return left != right, first * second
     return False, value
 
@@ -252,7 +252,7 @@ class _FactorText(Infix):
         return "abs" if op == casadi.OP_FABS else super()._call_text(op)
 
 
-def _factor(value: SX) -> str:
+def _factor_text(value: SX) -> str:
     """Return the text of an expression, in parentheses if it is a sum."""
     symbols = casadi.symvar(value)
     graph = graph_of(Function("value", [casadi.vertcat(SX(0, 1), *symbols)], [value], ["p"], ["y"]))

@@ -71,7 +71,7 @@ def cut_relations(system: System) -> Iterator[Relation]:
         system: system with closed loops.
     """
     for cut in system.cuts:
-        axis, shared = _share(cut)
+        axis, shared = _shared_frame(cut)
         sides = [(cut.link_a, cut.pose_a, 1), (cut.link_b, cut.pose_b, -1)]
         through = {
             link: (lambda_transform(pose @ axis), sign) for link, pose, sign in sides if link >= 0
@@ -84,7 +84,7 @@ def cut_relations(system: System) -> Iterator[Relation]:
             yield relation
 
 
-def _share(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
+def _shared_frame(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
     """Return the frame of a body that may be attributed to either side of a cut joint.
 
     The second result lists tuples of kinds of inertial parameters that change together with equal
@@ -104,11 +104,11 @@ def _share(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
         return Pose.identity(), ()
     slides = len(turning) < len(freedoms)
     if len(turning) == 1 and turning[0].motion is Motion.REVOLUTE:
-        return _along(turning[0]), _SYMMETRIC[:1] if slides else _SYMMETRIC
+        return _axis_pose(turning[0]), _SYMMETRIC[:1] if slides else _SYMMETRIC
     return Pose.identity(), () if slides else _SYMMETRIC[2:]
 
 
-def _along(freedom: Freedom) -> Pose:
+def _axis_pose(freedom: Freedom) -> Pose:
     """Return the pose that rotates the z axis onto the axis of a joint freedom."""
     return Pose.rotation(align_z(freedom.axis))
 
@@ -130,8 +130,8 @@ def pair_relations(
     for b in range(1, len(R)):
         for a in range(b):
             relative = np.einsum("sji,sjk->sik", R[a], R[b])
-            if _constant(relative):
-                same = not base_moves and (a == 0 or _side_by_side(poses, a, b))
+            if _is_constant(relative):
+                same = not base_moves and (a == 0 or _has_constant_offset(poses, a, b))
                 yield from _shared_by_pair(a - 1, b - 1, _rotation(relative[0]), same)
 
 
@@ -141,12 +141,12 @@ def _rotation(R: Array) -> SX:
     return SX(DM(nearest_rotation(R.tolist(), noise=noise)))
 
 
-def _side_by_side(poses: Sequence[tuple[Array, Array]], a: int, b: int) -> bool:
+def _has_constant_offset(poses: Sequence[tuple[Array, Array]], a: int, b: int) -> bool:
     """Whether the vector between origins a and b is constant, so that they have the same velocity.
 
     `poses` are pairs of orientations and origins as returned by `_link_poses`.
     """
-    return all(_constant(origins[b] - origins[a]) for _, origins in poses)
+    return all(_is_constant(origins[b] - origins[a]) for _, origins in poses)
 
 
 def _shared_by_pair(a: int, b: int, R: SX, moments: bool) -> Iterator[Relation]:
@@ -173,7 +173,7 @@ def _link_poses(system: System, configurations: ClosedConfigurations) -> tuple[A
     return matrices[..., :3, :3], matrices[..., :3, 3]
 
 
-def _constant(values: Array) -> bool:
+def _is_constant(values: Array) -> bool:
     """Whether values (n, ...) are equal in all n configurations."""
     return bool(np.max(np.abs(values - values[0])) < _SAME)
 
@@ -215,19 +215,21 @@ def turning_relations(
         base_moves: whether the base moves, so that the velocities of links do not follow from the
             joints.
     """
-    G = np.concatenate([_slopes(system, each) for each in configurations])
+    G = np.concatenate([_velocity_matrices(system, each) for each in configurations])
     links = system.tree.links
     joints = {j: G[:, link.v.start] for j, link in enumerate(links) if link.motion.nv == 1}
-    angular = [] if base_moves else list(_angular(system, configurations, G))
+    angular = [] if base_moves else list(_angular_velocities(system, configurations, G))
     for j, rows in enumerate(angular):
         axis = _one_direction(rows)
         if axis is not None:
             yield {(j, _MOMENTS[k]): SX(axis[k]) for k in np.flatnonzero(axis)}
-    energies = [e for j, rows in enumerate(angular) for e in _rotational(j, rows)]
-    energies += (Effect((j, "Ia"), _product(rows, rows)) for j, rows in joints.items())
-    yield from _dependent(energies)
-    yield from _dependent([Effect((j, "Fv"), _product(g, g)) for j, g in joints.items()])
-    yield from _dependent([Effect((j, "offset"), g.ravel()) for j, g in joints.items()])
+    energies = [e for j, rows in enumerate(angular) for e in _inertia_effects(j, rows)]
+    energies += (Effect((j, "Ia"), _velocity_products(rows, rows)) for j, rows in joints.items())
+    yield from _dependence_relations(energies)
+    yield from _dependence_relations(
+        [Effect((j, "Fv"), _velocity_products(g, g)) for j, g in joints.items()]
+    )
+    yield from _dependence_relations([Effect((j, "offset"), g.ravel()) for j, g in joints.items()])
     yield from _dry_friction(links, joints)
 
 
@@ -242,14 +244,16 @@ def configurations_needed(system: System) -> int:
     return max(12, -(-3 * effects // (m * (m + 1))))
 
 
-def _slopes(system: System, configurations: ClosedConfigurations) -> Array:
+def _velocity_matrices(system: System, configurations: ClosedConfigurations) -> Array:
     """Return the matrices (configurations, nv, m) from independent to tree velocities."""
     at = reduction_matrix(system)
     p = [configurations.p] if configurations.p.size else []
     return np.array([np.array(at(position, *p)) for position in configurations.q.T])
 
 
-def _angular(system: System, configurations: Sequence[ClosedConfigurations], G: Array) -> Array:
+def _angular_velocities(
+    system: System, configurations: Sequence[ClosedConfigurations], G: Array
+) -> Array:
     """Return the angular velocities (links, configurations, 3, m) in the frames of the links."""
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     motions = link_velocities(system.tree, link_poses(system.tree, q), v)
@@ -276,16 +280,16 @@ def _one_direction(rows: Array) -> Array | None:
     return unit
 
 
-def _rotational(j: int, rows: Array) -> Iterator[Effect]:
+def _inertia_effects(j: int, rows: Array) -> Iterator[Effect]:
     """Yield the effects of the inertia tensor of link j on its kinetic energy.
 
     `rows` (configurations, 3, m) is its angular velocity per independent velocity.
     """
     for name, (k, i) in zip(TEN_PARAMETERS, zip(*np.triu_indices(3), strict=True), strict=False):
-        yield Effect((j, name), (1 if k == i else 2) * _product(rows[:, k], rows[:, i]))
+        yield Effect((j, name), (1 if k == i else 2) * _velocity_products(rows[:, k], rows[:, i]))
 
 
-def _product(first: Array, second: Array) -> Array:
+def _velocity_products(first: Array, second: Array) -> Array:
     """Return the products of two velocities (configurations, m) as flattened quadratic forms.
 
     The elements are coefficients of products of independent velocities.
@@ -294,7 +298,7 @@ def _product(first: Array, second: Array) -> Array:
     return np.ravel(first[:, k] * second[:, i] + first[:, i] * second[:, k])
 
 
-def _dependent(effects: Sequence[Effect]) -> Iterator[Relation]:
+def _dependence_relations(effects: Sequence[Effect]) -> Iterator[Relation]:
     """Yield relations between the parameters whose effects are linearly dependent."""
     if not effects:
         return

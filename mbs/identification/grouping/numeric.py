@@ -16,7 +16,7 @@ from mbs.assembly import System
 from mbs.assembly.tree import quaternion_slices
 from mbs.errors import ModelError
 from mbs.identification.grouping.grouping import Check, Grouping, equation
-from mbs.identification.regressors import Column, every_column, numbers_among, regressor
+from mbs.identification.regressors import Column, column_indices, every_column, regressor
 from mbs.loops.closing import Closing
 from mbs.loops.examination import configuration_report
 from mbs.loops.reduction import reduction_matrix
@@ -175,11 +175,11 @@ def random_states(system: System, p: Array, count: int, seed: int) -> States:
         configurations = closed_positions(system, p, _CONFIGURATIONS, seed)
         q = configurations[:, np.arange(count) % configurations.shape[1]]
     else:
-        q = _any(system, count, rng)
+        q = _random_positions(system, count, rng)
     return States(q, rng.uniform(-2, 2, (m, count)), rng.uniform(-3, 3, (m, count)))
 
 
-def _any(system: System, count: int, rng: np.random.Generator) -> Array:
+def _random_positions(system: System, count: int, rng: np.random.Generator) -> Array:
     """Return random positions (nq, count) with unit quaternions, for an open system."""
     scale = np.array([np.pi if c.unit == "rad" else 1.0 for c in system.coordinates])
     q = scale[:, None] * rng.uniform(-1, 1, (system.nq, count))
@@ -305,7 +305,7 @@ def sampled_regressor(system: System, columns: Sequence[Column], states: States,
         ModelError: a column is not a parameter of the system.
     """
     every = every_column(system, columns)
-    numbers = numbers_among(system, every, columns)
+    numbers = column_indices(system, every, columns)
     D = regressor(system, every, moving_base=states.base is not None)
     inputs = [states.q, states.v, states.a, *(states.base or ())]
     inputs += [np.tile(p[:, None], (1, states.count))] if system.parameters else []
@@ -381,9 +381,11 @@ def grouped_by_rank(sample: RegressorSample, order: Sequence[int]) -> tuple[Grou
     """
     found = dependence(sample.W, order)
     grouping = applied(Grouping.none(len(sample.columns)), found)
-    text = f"the regressor in random states has the rank {len(found.independent)}" + _gap(found)
+    text = f"the regressor in random states has the rank {len(found.independent)}" + _gap_text(
+        found
+    )
     check = Check(
-        len(found.independent), True, (), True, found.residual, found.gap, _sentence(text)
+        len(found.independent), True, (), True, found.residual, found.gap, _capitalised(text)
     )
     return grouping, check
 
@@ -431,8 +433,10 @@ def checked(
     exact = error < _EXACT
     relations = relation_texts(sample.columns, kept, found) if exact else ()
     agrees = exact and rank == len(kept)
-    text = _verdict(len(kept), rank, relations) if exact else _inexact(error)
-    return Check(rank, agrees, relations, False, error, full.gap, _sentence(text + _gap(full)))
+    text = _rank_text(len(kept), rank, relations) if exact else _error_text(error)
+    return Check(
+        rank, agrees, relations, False, error, full.gap, _capitalised(text + _gap_text(full))
+    )
 
 
 def remainder(sample: RegressorSample, grouping: Grouping, order: Sequence[int]) -> Dependence:
@@ -467,7 +471,7 @@ def relation_texts(
     return tuple(lines)
 
 
-def _inexact(error: float) -> str:
+def _error_text(error: float) -> str:
     """Return the message that the rules do not reproduce the regressor, with the relative error."""
     return (
         f"the rules are not exact: the grouped regressor differs by {error:.2g} of its longest"
@@ -475,7 +479,7 @@ def _inexact(error: float) -> str:
     )
 
 
-def _verdict(count: int, rank: int, relations: Sequence[str]) -> str:
+def _rank_text(count: int, rank: int, relations: Sequence[str]) -> str:
     """Return text that compares the `count` of kept parameters to the rank of the regressor.
 
     `relations` are texts of the missing relations.
@@ -486,7 +490,7 @@ def _verdict(count: int, rank: int, relations: Sequence[str]) -> str:
     return f"the rules keep {count} parameters, but the regressor has the rank {rank}: {told}"
 
 
-def _gap(found: Dependence) -> str:
+def _gap_text(found: Dependence) -> str:
     """Return text on the gap of the singular values at the rank; empty if the gap is infinite."""
     if np.isinf(found.gap):
         return ""
@@ -494,6 +498,6 @@ def _gap(found: Dependence) -> str:
     return f" (gap of the singular values {found.gap:.1e}{doubt})"
 
 
-def _sentence(text: str) -> str:
+def _capitalised(text: str) -> str:
     """Return the text with an upper-case first letter."""
     return text[0].upper() + text[1:]

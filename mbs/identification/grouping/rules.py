@@ -114,9 +114,9 @@ class Structure:
     def point_rests(self, j: int, points: Array) -> bool:
         """Whether points (samples, 3) on axis j are fixed under all joints that precede link j."""
         before = self.before(j)
-        return not self.base_moves and all(self._holds(k, points) for k in before)
+        return not self.base_moves and all(self._keeps_points(k, points) for k in before)
 
-    def _holds(self, k: int, points: Array) -> bool:
+    def _keeps_points(self, k: int, points: Array) -> bool:
         """Whether points (samples, 3) do not move under joint k: on its axis, or at its centre."""
         match self.tree.links[k].motion:
             case Motion.REVOLUTE:
@@ -280,7 +280,7 @@ def tree_rules(structure: Structure) -> Iterator[Removal]:
     for j in reversed(range(len(structure.tree.links))):
         yield from _moved_to_antecedent(structure, j)
         yield from _without_effect(structure, j)
-        yield from _rotor(structure, j)
+        yield from _rotor_rules(structure, j)
 
 
 def _moved_to_antecedent(structure: Structure, j: int) -> Iterator[Removal]:
@@ -319,28 +319,28 @@ def _without_effect(structure: Structure, j: int) -> Iterator[Removal]:
     """Yield the eliminations of parameters of link j that depend on the motions it can have."""
     match structure.tree.links[j].motion:
         case Motion.REVOLUTE:
-            yield from _revolute(structure, j)
+            yield from _revolute_rules(structure, j)
         case Motion.PRISMATIC:
-            yield from _prismatic(structure, j)
+            yield from _prismatic_rules(structure, j)
         case Motion.SPHERICAL:
-            yield from _spherical(structure, j)
+            yield from _spherical_rules(structure, j)
 
 
-def _revolute(structure: Structure, j: int) -> Iterator[Removal]:
+def _revolute_rules(structure: Structure, j: int) -> Iterator[Removal]:
     """Yield the eliminations for a revolute link j.
 
     A link that rotates about one direction has ZZ only. A link on a fixed axis along gravity has no
     MX and MY.
     """
     if structure.one_direction([*structure.before(j), j]):
-        yield from _nothing(j, ("XX", "XY", "XZ", "YZ"))
-    if _on_line(structure, j):
-        yield from _nothing(j, ("MX", "MY"))
+        yield from _all_removed(j, ("XX", "XY", "XZ", "YZ"))
+    if _is_on_fixed_line(structure, j):
+        yield from _all_removed(j, ("MX", "MY"))
     elif structure.weightless:
         yield from _about_resting_point(structure, j)
 
 
-def _on_line(structure: Structure, j: int) -> bool:
+def _is_on_fixed_line(structure: Structure, j: int) -> bool:
     """Whether axis j is a fixed line, with zero gravity or gravity along it."""
     before = structure.before(j)
     return (
@@ -362,23 +362,23 @@ def _about_resting_point(structure: Structure, j: int) -> Iterator[Removal]:
         yield Removal((j, name), {key: x for key, x in effects.items() if key != (j, name)})
 
 
-def _prismatic(structure: Structure, j: int) -> Iterator[Removal]:
+def _prismatic_rules(structure: Structure, j: int) -> Iterator[Removal]:
     """Yield eliminations of first moments of a prismatic link j, which need an earlier rotation."""
     before = structure.before(j)
     turning = structure.turning(before)
     if structure.rests(before):
-        yield from _nothing(j, _MOMENTS)
+        yield from _all_removed(j, _MOMENTS)
     elif structure.one_direction(before) and structure.parallel(turning[0], j):
         through = lambda_transform(structure.tree.links[j].pose())
         for name in ("MX", "MY"):
             antecedent = structure.tree.links[j].antecedent
             yield Removal((j, name), on_link(antecedent, _column(through, name)))
-        yield from _nothing(j, ("MZ",))
+        yield from _all_removed(j, ("MZ",))
     elif structure.one_direction(before):
-        yield _moments_across(structure, turning[0], j)
+        yield _moment_along_rotation(structure, turning[0], j)
 
 
-def _moments_across(structure: Structure, first: int, j: int) -> Removal:
+def _moment_along_rotation(structure: Structure, first: int, j: int) -> Removal:
     """Return the elimination of the first moment of link j along its only direction of rotation.
 
     It has no effect. With the axis (ax, ay, az) of link `first` in frame j, it is ax MX + ay MY +
@@ -393,13 +393,13 @@ def _moments_across(structure: Structure, first: int, j: int) -> Removal:
     return Removal((j, _MOMENTS[leaving]), effects)
 
 
-def _spherical(structure: Structure, j: int) -> Iterator[Removal]:
+def _spherical_rules(structure: Structure, j: int) -> Iterator[Removal]:
     """Yield the elimination of first moments of link j about a fixed centre, without gravity."""
     if structure.weightless and structure.point_rests(j, structure.origins[:, j]):
-        yield from _nothing(j, _MOMENTS)
+        yield from _all_removed(j, _MOMENTS)
 
 
-def _rotor(structure: Structure, j: int) -> Iterator[Removal]:
+def _rotor_rules(structure: Structure, j: int) -> Iterator[Removal]:
     """Yield the elimination of Ia or Jm of joint j if other parameters have the same effect."""
     effects, rotor = _rotor_effects(structure, j), structure.tree.links[j].rotor
     if effects is not None:
@@ -419,7 +419,7 @@ def _rotor_effects(structure: Structure, j: int) -> Effects | None:
         case Motion.SPHERICAL if structure.rests(structure.before(j)):
             return {(j, name): SX(1) for name in ("XX", "YY", "ZZ")}
         case Motion.PRISMATIC if _slides_alone(structure, j):
-            return {(j, "M"): SX(1), **_mass_before(link)}
+            return {(j, "M"): SX(1), **_mass_on_antecedent(link)}
     return None
 
 
@@ -442,7 +442,7 @@ def _slides_alone(structure: Structure, j: int) -> bool:
     )
 
 
-def _mass_before(link: Link) -> dict[Key, SX]:
+def _mass_on_antecedent(link: Link) -> dict[Key, SX]:
     """Return minus the parameters on the antecedent of a unit mass at the origin of the link.
 
     Empty if the antecedent is the base.
@@ -469,6 +469,6 @@ def on_link(link: int, column: SX) -> dict[Key, SX]:
     return {(link, name): x for name, x in pairs if not x.is_zero()}
 
 
-def _nothing(j: int, names: Iterable[str]) -> Iterator[Removal]:
+def _all_removed(j: int, names: Iterable[str]) -> Iterator[Removal]:
     """Yield eliminations of the parameters `names` of link j, which have no effect at all."""
     yield from (Removal((j, name), {}) for name in names)

@@ -73,7 +73,7 @@ class PoseKernel:
             self.labels = tuple(str(k + 1) for k in range(_CANDIDATES))
         else:
             self.labels = branch_labels(chain, solves, p)
-        self._handed = core.handed_of(self.arm)
+        self._handed = core.c_arm_of(self.arm)
         self._lock = threading.Lock()
         self._code: _PoseCode | None = None
         self._buffers: _Buffers | None = None
@@ -237,7 +237,7 @@ def _pose_code(chain: FrameChain, p: Array, solves: StepSequence | General) -> _
             handed.address, solves.handed.address, *[None] * 3, *[0] * 5, 0.0, NEARLY_SINGULAR, *end
         )
     else:
-        machine, handed = machine_code(plain_branches(chain, solves, p)), core.handed_of(arm)
+        machine, handed = machine_code(plain_branches(chain, solves, p)), core.c_arm_of(arm)
         if machine is None:
             return None
         arguments, results, integers, reals = machine.work

@@ -315,7 +315,9 @@ def _attached(
         given[name] = ((turn.coordinate, turn.factor),) if turn.coordinate else ()
     given |= {name: ((f"{part.name}.{name}", 1.0),) for name in part.names_of("unknown")}
     coordinates = {
-        port: tuple(_lever(part, name, to_sx(factor, symbols), tables) for name, factor in levers)
+        port: tuple(
+            _moment_arm(part, name, to_sx(factor, symbols), tables) for name, factor in levers
+        )
         for port, levers in given.items()
     }
     names = [point.owner.name for point in part.points]
@@ -331,7 +333,7 @@ def _attached(
             for name in part.input_names
         },
         symbols=symbols,
-        where=_where(names) if names else "",
+        where=_place_text(names) if names else "",
     )
 
 
@@ -358,12 +360,14 @@ def _require_moving(
         )
 
 
-def _where(names: Sequence[str]) -> str:
+def _place_text(names: Sequence[str]) -> str:
     """Return text on the components that a component acts on: "on a" or "between a and b"."""
     return f"between {listed(names)}" if len(names) > 1 else f"on {names[0]}"
 
 
-def _lever(part: Custom, name: str, factor: SX, tables: tuple[_Rows, _Rows, _Rows]) -> MomentArm:
+def _moment_arm(
+    part: Custom, name: str, factor: SX, tables: tuple[_Rows, _Rows, _Rows]
+) -> MomentArm:
     """Return the moment arm of a component on the coordinate `name`.
 
     `factor` is the derivative of the port's value; `tables` are the coordinates of q, of v, and of

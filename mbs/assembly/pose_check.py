@@ -46,7 +46,7 @@ a frame on the wrong side an error of a link length. Positions are relative to t
 _FUNCTIONS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt, "atan2": np.arctan2}
 
 
-def prove(
+def check_poses(
     mechanism: Description,
     framed: KhalilTree,
     places: Places,

@@ -12,7 +12,7 @@ from casadi import SX
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.model_function import require_system
 from mbs.assembly.system import System
-from mbs.assembly.tables import AttachedSensor, JointRow
+from mbs.assembly.tables import JointRow
 from mbs.assembly.tree import Frame, Link, Tree
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
@@ -338,14 +338,6 @@ def _with_position(pose: Pose, values: _Symbols) -> Pose:
     if not values:
         return pose
     return pose.at(casadi.vertcat(*(values.get(k, pose.p[i]) for i, k in enumerate("xyz"))))
-
-
-def _sensor(sensor: AttachedSensor, joints: Sequence[JointRow]) -> AttachedSensor:
-    """Return a sensor on a joint with the changed frames of this joint."""
-    if sensor.joint is None:
-        return sensor
-    joint = joints[sensor.joint]
-    return replace(sensor, frames=(joint.frame_a, joint.frame_b))
 
 
 def _cut(cut: Cut, given: _Given) -> Cut:

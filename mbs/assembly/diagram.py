@@ -343,7 +343,8 @@ class _Layout:
         columns = -(-len(chain) // _LONGEST)
         rows = -(-len(chain) // columns)
         edges = [self.graph.children[number][0] for number in chain[:-1]]
-        wide = max(self.branch_alone(edge) for edge in edges) + 3 * _GAP
+        boxes = (_box_size(self.graph.nodes[edge.ends[1]])[0] for edge in edges)
+        wide = max(*boxes, *map(pill_width, edges)) + 3 * _GAP
         for k, number in enumerate(chain):
             column, row = divmod(k, rows)
             x = (column + 0.5) * wide
@@ -351,10 +352,6 @@ class _Layout:
             if k:
                 edge = edges[k - 1]
                 self.tree.append(PlacedEdge(edge, x, (row - 0.5) * LEVEL + 3, pill_width(edge)))
-
-    def branch_alone(self, edge: ConnectionEdge) -> float:
-        """Return the width [px] of a joint with only the link below it."""
-        return max(pill_width(edge), _box_size(self.graph.nodes[edge.ends[1]])[0])
 
 
 _MARGIN, _TITLE, _FOOT = 26.0, 46.0, 40.0

@@ -95,7 +95,7 @@ def connection_graph(
     _check_transmissions(mechanism)
     welds = _welds(mechanism, symbols)
     _require_connected(mechanism, welds)
-    at = _evaluator(symbols, values)
+    at = _Evaluator(symbols, values)
     nodes: list[BodyNode] = []
     home: dict[Port, int] = {}
     for port in _ports(mechanism):
@@ -236,11 +236,6 @@ class _Evaluator:
         if not casadi.symvar(value):
             return np.array(casadi.DM(value))
         return np.array(casadi.Function("f", [self.p], [value])(self.values))
-
-
-def _evaluator(symbols: Mapping[str, SX], values: Mapping[str, float]) -> _Evaluator:
-    """Return a callable that evaluates expressions at values of the parameters."""
-    return _Evaluator(symbols, values)
 
 
 def _require_same_place(port: Port, first: Pose, second: Pose, at: _Evaluator) -> None:

@@ -79,7 +79,8 @@ def open_system(mechanism: Description, guessed: Collection[str] = ()) -> System
     on_links = [(body, places[body.name, ""][0]) for body in faulty]
     notes += [note for note in inertia_notes(framed.tree, on_links) if note not in notes]
     joints = {joint.name: joint for joint in mechanism.joints()}
-    in_loops = _looped_joints(framed) | _driven_joints(mechanism)
+    looped = {name for cut in framed.cuts for name in _loop_joints(framed, cut)}
+    in_loops = looped | _driven_joints(mechanism)
     moving_links = [
         (link.motion, link.name, joints[name])
         for link, name in zip(framed.tree.links, framed.joints, strict=True)
@@ -167,11 +168,6 @@ def _loop_joints(framed: KhalilTree, cut: Cut) -> list[str]:
     a, b = (set(framed.tree.path(link)) for link in (cut.link_a, cut.link_b))
     names = [framed.joints[j] for j in sorted(a ^ b)]
     return list(dict.fromkeys(names))
-
-
-def _looped_joints(framed: KhalilTree) -> set[str]:
-    """Return the names of all joints in loops."""
-    return {name for cut in framed.cuts for name in _loop_joints(framed, cut)}
 
 
 def _driven_joints(mechanism: Description) -> set[str]:

@@ -144,7 +144,7 @@ def _describe(
                 (name, "a"),
                 (name, "b"),
                 lambda name=name, moves=moves: _motion(name, moves, q),  # type: ignore[misc]
-                lambda name=name, moves=moves: _motion_back(name, moves, q),  # type: ignore[misc]
+                lambda name=name, moves=moves: _inverse(_motion(name, moves, q)),  # type: ignore[misc]
             )
     found: dict[tuple[str, str], Array] = {(mechanism.world.name, ""): np.eye(4)}
     queue = deque(found)
@@ -197,11 +197,6 @@ def _motion(name: str, freedoms: Sequence[Freedom], q: Mapping[str, Array]) -> A
     for freedom in freedoms:
         T = T @ _elementary_motion(freedom, q[freedom.coordinate_of(name)])
     return T
-
-
-def _motion_back(name: str, freedoms: Sequence[Freedom], q: Mapping[str, Array]) -> Array:
-    """Return the pose of frame_a of joint `name` in its frame_b, at positions q by coordinate."""
-    return _inverse(_motion(name, freedoms, q))
 
 
 def _elementary_motion(freedom: Freedom, q: Array) -> Array:

@@ -51,7 +51,7 @@ class Arm:
 
     @property
     def between(self) -> list[Array]:
-        """Constant transforms `gaps`, as a list."""
+        """Constant transforms `gaps` as a list, under the name that `transforms` uses."""
         return list(self.gaps)
 
     def displacements(self, q: Array) -> list[Array]:

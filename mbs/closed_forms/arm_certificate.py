@@ -18,9 +18,14 @@ from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Arm, Array, inverse, motion
 from mbs.closed_forms.arm_search import General, general, random_configurations
-from mbs.closed_forms.raghavan_roth.numbers import (
+from mbs.closed_forms.displacement_matrices import (
     KEPT_BY_SLIDE,
     KEPT_BY_TURN,
+    frame_products,
+    motion_parts,
+    rho,
+)
+from mbs.closed_forms.raghavan_roth.numbers import (
     Arrangement,
     Prepared,
     at,
@@ -28,9 +33,6 @@ from mbs.closed_forms.raghavan_roth.numbers import (
     for_poses,
     loop_length,
     middle_joints,
-    motion_parts,
-    pair,
-    rho,
 )
 from mbs.solvers.homotopy import solved
 
@@ -130,11 +132,11 @@ def _second_positions(
     if only one equation exists.
     """
     kept = KEPT_BY_SLIDE if prismatic[0] else KEPT_BY_TURN
-    moved = np.einsum("iab,nb->nai", motion_parts(bool(prismatic[1])), pair(beyond))
+    moved = np.einsum("iab,nb->nai", motion_parts(bool(prismatic[1])), frame_products(beyond))
     A = (rho(way) @ moved)[:, kept]
     A = np.where(np.all(np.isfinite(A), axis=(1, 2), keepdims=True), A, 0.0)
     U, s, Vh = np.linalg.svd(A[:, :, 1:], full_matrices=False)
-    g = np.einsum("nai,na->ni", U.conj(), pair(goal)[kept] - A[:, :, 0])
+    g = np.einsum("nai,na->ni", U.conj(), frame_products(goal)[kept] - A[:, :, 0])
     used = s > _FLAT * s[:, :1]
     flat = np.flatnonzero(~used[:, 1])
     g = np.where(used, g / np.where(used, s, 1.0), 0.0)

@@ -47,10 +47,8 @@ def _left_products(a: Complex) -> Complex:
 
 def _right_products(b: Complex) -> Complex:
     """Return the matrices (..., 4, 4) of quaternion products q b for vectors b (..., 3)."""
-    x, y, z = np.moveaxis(b, -1, 0)
-    o = np.zeros_like(x)
-    rows = np.array([[o, -x, -y, -z], [x, o, z, -y], [y, -z, o, x], [z, y, -x, o]])
-    product: Complex = np.moveaxis(rows, (0, 1), (-2, -1))
+    signs = np.array([-1.0, 1.0, 1.0, 1.0])
+    product: Complex = signs[:, None] * signs * np.swapaxes(_left_products(b), -1, -2)
     return product
 
 

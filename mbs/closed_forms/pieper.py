@@ -678,12 +678,13 @@ def pieper(problem: Problem) -> StepSequence:
     regular = [steps for steps in found if _regular(problem, steps)]
     if not regular:
         raise NoClosedForm(_degenerate(scenes))
-    return min((StepSequence(_JOINTS, steps) for steps in regular), key=_cost)
-
-
-def _cost(sequence: StepSequence) -> tuple[int, int]:
-    """Return the number of branches and the number of quartics of a solution, as a sort key."""
-    return sequence.branches, sum(step.kind == "quartic" for step in sequence.steps)
+    return min(
+        (StepSequence(_JOINTS, steps) for steps in regular),
+        key=lambda sequence: (
+            sequence.branches,
+            sum(step.kind == "quartic" for step in sequence.steps),
+        ),
+    )
 
 
 def _concurrent_steps(scene: PieperLoop) -> list[SequenceStep] | None:

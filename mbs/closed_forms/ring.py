@@ -7,7 +7,7 @@ Source: Khalil & Creusot 1997, eq. 2.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable
+from collections.abc import Container
 from dataclasses import dataclass
 
 import casadi
@@ -25,7 +25,6 @@ from mbs.expressions import to_sx
 from mbs.recursions.chain import (
     ChainBuilder,
     ChainJoint,
-    Gap,
     Ring,
     Spin,
     links_between,
@@ -200,13 +199,8 @@ def gap_samples(ring: Ring, q: SX, p: SX) -> list[list[Matrix]]:
     """
     return [
         [np.array(DM(T)) for T in values]
-        for values in _values_at_samples(_matrices(ring.gaps), q, p)
+        for values in _values_at_samples([gap.pose.matrix for gap in ring.gaps], q, p)
     ]
-
-
-def _matrices(gaps: Iterable[Gap]) -> list[SX]:
-    """Return the matrices (4, 4) of the known transforms of a loop."""
-    return [gap.pose.matrix for gap in gaps]
 
 
 def _values_at_samples(values: list[SX], q: SX, p: SX) -> list[list[DM]]:

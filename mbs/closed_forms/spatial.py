@@ -177,7 +177,10 @@ def confine(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     for path in (begun, begun.reversed().rotated(1)):
         if path.joints[0].is_rotational:
             normal = _normal(path, q, p)
-            if normal is not None and not _is_across(path, normal, q, p):
+            if normal is None:
+                continue
+            across = in_plane(path.gaps[1].pose.R @ normal)  # zero: joint 1 is parallel to it
+            if not always_zero(across, q, p):
                 return _confine_branches(path, normal)
     return None
 
@@ -196,11 +199,6 @@ def _normal(ring: Ring, q: SX, p: SX) -> SX | None:
         across_it = always_zero(axis[2], q, p)
         return (axis if second else vector(_Z)) if across_it else None
     return vector(_Z) if parallel(between, q, p) else None
-
-
-def _is_across(ring: Ring, normal: SX, q: SX, p: SX) -> bool:
-    """Whether the axis of joint 1 is parallel to the normal, so that it cannot reach the plane."""
-    return always_zero(in_plane(ring.gaps[1].pose.R @ normal), q, p)
 
 
 def _confine_branches(ring: Ring, normal: SX) -> LoopBranches:

@@ -365,7 +365,8 @@ def identify(
     """
     _check_choices(system, method, equations, smoothing)
     records = _record_tuple(system, record, bandwidth)
-    known, options = prior or Prior(), _options(rotors, offsets, couplings)
+    options: dict[str, Any] = {"rotors": rotors, "offsets": offsets, "couplings": couplings}
+    known = prior or Prior()
     with progress(f"{system.name}: identification", 0.0, 1.0, quiet=quiet) as reached:
         D = regressor(system, **options)
         base = base_parameters(system, columns=D.columns)
@@ -428,11 +429,6 @@ def _record_tuple(
             f"{system.name}: the bandwidth is {quoted(bandwidth)}; give a number in Hz"
         )
     return given
-
-
-def _options(rotors: bool, offsets: bool, couplings: Sequence[Joints]) -> dict[str, Any]:
-    """Return the options of `columns_of` as a dict of keyword arguments."""
-    return {"rotors": rotors, "offsets": offsets, "couplings": couplings}
 
 
 def _check_choices(system: System, method: str, equations: str, smoothing: object) -> None:

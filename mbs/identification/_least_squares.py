@@ -489,7 +489,8 @@ def _tracked_acceleration(regressor: Any, K: Array, w: float) -> Function:
     state is (q, v); given is (q_m, v_m, tau): measured motion and efforts. K (k,) are the
     parameters, `w` is the bandwidth of the controller [rad/s].
     """
-    m, kind = int(regressor.size1_in(1)), _symbol_class(regressor)
+    m = int(regressor.size1_in(1))
+    kind: Any = SX if is_explicit(regressor.system) else MX  # MX for an iterative loop closure
     state, given, a = kind.sym("state", 2 * m), kind.sym("given", 3 * m), kind.sym("a", m)
     q, v = state[:m], state[m:]
     q_m, v_m, tau = given[:m], given[m : 2 * m], given[2 * m :]
@@ -510,11 +511,6 @@ def _efforts(regressor: Any, K: Array) -> Function:
     D = motion_function(regressor)(configuration_of(regressor.system, q), v, a)
     function = Function("efforts", [q, v, a], [casadi.mtimes(D, DM(K))])
     return function.expand() if is_explicit(regressor.system) else function
-
-
-def _symbol_class(regressor: Any) -> Any:
-    """Return the CasADi symbol class: SX if the loops close without iteration, otherwise MX."""
-    return SX if is_explicit(regressor.system) else MX
 
 
 def _runge_kutta(acceleration: Function, h: float) -> Function:

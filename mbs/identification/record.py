@@ -700,7 +700,7 @@ class Samples:
     @property
     def rate(self) -> float:
         """Sampling rate [Hz]."""
-        return (len(self.time) - 1) / float(self.time[-1] - self.time[0])
+        return _rate(self.time)
 
 
 def resampled(record: Record, rate: float | None = None) -> Record:
@@ -801,7 +801,7 @@ def smoothed(record: Record, bandwidth: float, order: int = ORDER) -> Samples:
         ModelError: the bandwidth does not match the sampling rate, or the record is too short.
     """
     even = _without_gaps(record, bandwidth)
-    rate = _rate(even)
+    rate = _rate(even.time)
     q = zero_phase(even.q, rate, bandwidth, order)
     return _trim(even, q, central_difference(q, rate), bandwidth, order)
 
@@ -821,7 +821,7 @@ def smoothed_with_velocity(record: Record, bandwidth: float, order: int = ORDER)
         raise ModelError("record: no velocities were measured; use smoothed(), or give v")
     even = _without_gaps(record, bandwidth)
     assert even.v is not None
-    rate = _rate(even)
+    rate = _rate(even.time)
     q, v = (zero_phase(x, rate, bandwidth, order) for x in (even.q, even.v))
     return _trim(even, q, v, bandwidth, order)
 
@@ -845,9 +845,9 @@ def _without_gaps(record: Record, bandwidth: float) -> Record:
     return resampled(record)
 
 
-def _rate(record: Record) -> float:
-    """Return the mean sampling rate of a record [Hz]."""
-    return (len(record.time) - 1) / float(record.time[-1] - record.time[0])
+def _rate(time: Array) -> float:
+    """Return the mean sampling rate [Hz] of instants `time` (n,) [s]."""
+    return (len(time) - 1) / float(time[-1] - time[0])
 
 
 def _trim(even: Record, q: Array, v: Array, bandwidth: float, order: int) -> Samples:
@@ -856,7 +856,7 @@ def _trim(even: Record, q: Array, v: Array, bandwidth: float, order: int) -> Sam
     Accelerations are differences of v, efforts pass the same filter, the ends with filter
     transients are dropped and the rows are decimated. Raises ModelError if too few rows remain.
     """
-    rate = _rate(even)
+    rate = _rate(even.time)
     a = central_difference(v, rate)
     tau = zero_phase(even.tau, rate, bandwidth, order)
     ends = int(np.ceil(DROPPED * rate / bandwidth))

@@ -248,18 +248,14 @@ def joined(functions: Sequence[Function]) -> tuple[Function, list[ArrayPort], li
             outputs.append(ArrayPort(title, _shape(result.shape)))
             results.append(casadi.vec(casadi.densify(result).T))
     name = "_".join(function.name() for function in functions)
-    whole = Function(name, list(symbols.values()), results, list(ports), _labels(len(results)))
+    labels = [f"result{k}" for k in range(len(results))]
+    whole = Function(name, list(symbols.values()), results, list(ports), labels)
     return _scalar_function(whole, len(functions)), list(ports.values()), outputs
 
 
 def _shape(size: tuple[int, int]) -> tuple[int, ...]:
     """Return the array shape of a matrix of this size; (n,) if it has one column."""
     return size[:1] if size[1] == 1 else size
-
-
-def _labels(count: int) -> list[str]:
-    """Return names for `count` outputs: result0, result1 and so on."""
-    return [f"result{k}" for k in range(count)]
 
 
 def _scalar_function(function: Function, parts: int) -> Function:

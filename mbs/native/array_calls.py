@@ -80,20 +80,12 @@ def array_builtin(
     return builtin
 
 
-def _indices(pattern: Sparsity) -> np.ndarray[Any, np.dtype[np.int64]]:
-    """Return the indices of the stored elements of a sparse matrix in the dense matrix.
-
-    Elements are counted column by column.
-    """
-    return np.array(pattern.find(), dtype=np.int64)
-
-
 def _shape(pattern: Sparsity) -> tuple[Any, ...]:
     """Return rows, columns, number of stored elements, and their indices, of a sparsity pattern.
 
     The indices are None if the matrix is dense.
     """
-    indices = None if pattern.is_dense() else _indices(pattern)
+    indices = None if pattern.is_dense() else np.array(pattern.find(), dtype=np.int64)
     return (*pattern.shape, pattern.nnz(), indices)
 
 

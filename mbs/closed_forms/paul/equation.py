@@ -12,16 +12,14 @@ import numpy as np
 from casadi import DM, SX
 from numpy.typing import NDArray
 
+from mbs.closed_forms.displacement_matrices import SIZE, motion_parts, symbolic_rho
 from mbs.closed_forms.paul.splits import (
     MOST_VARIABLES,
-    SIZE,
     KnownFrames,
     Members,
     SplitRow,
     Values,
     Variable,
-    joint_basis,
-    represented_pose,
     simple_rows,
     splits,
 )
@@ -239,7 +237,7 @@ def _key(term: Members, variables: tuple[Variable, ...]) -> Key:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RingMatrices:
-    """Known transforms of a loop as (15, 15) matrices, see `represented`; from `ring_matrices`.
+    """Known transforms of a loop as (15, 15) matrices, see `symbolic_rho`; from `ring_matrices`.
 
     Attributes:
         on: matrices from joint to joint.
@@ -268,8 +266,8 @@ def ring_matrices(ring: Ring) -> RingMatrices:
     """
     poses = [gap.pose for gap in ring.gaps]
     opposite = [gap.inverse().pose for gap in ring.gaps]
-    on = tuple(map(represented_pose, poses, opposite))
-    back = tuple(map(represented_pose, opposite, poses))
+    on = tuple(map(symbolic_rho, poses, opposite))
+    back = tuple(map(symbolic_rho, opposite, poses))
     squares = [SX(casadi.sumsqr(pose.p)) for pose in poses]
     numbers = [square for square in squares if square.is_constant() and float(square) > 0]
     # 1e-30 m if all symbolic lengths are zero, to prevent division by zero
@@ -376,7 +374,7 @@ def _coefficient(
         knowledge: known joints, whose positions are inserted.
         matrices: matrices of the known transforms.
         row: frames and element of w of the equation.
-        chosen: index of the function of each joint in the product, see `joint_basis`.
+        chosen: index of the function of each joint in the product, see `motion_parts`.
     """
     total = SX(0)
     for direction in (1, -1):
@@ -438,5 +436,5 @@ def _joint_matrix(knowledge: KnownFrames, k: int, number: int, direction: int) -
 @cache
 def _sparse_basis(turns: bool, sign: int) -> tuple[SX, SX, SX]:
     """Return three basis matrices of a joint that moves with (sign 1) or against the path (-1)."""
-    one, first, second = (SX(casadi.sparsify(DM(matrix))) for matrix in joint_basis(not turns))
+    one, first, second = (SX(casadi.sparsify(DM(matrix))) for matrix in motion_parts(not turns))
     return (one, first, sign * second) if turns else (one, sign * first, second)

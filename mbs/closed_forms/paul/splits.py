@@ -19,9 +19,10 @@ import numpy as np
 from casadi import SX, Function
 from numpy.typing import NDArray
 
+from mbs.closed_forms.arm import inverse, motion
+from mbs.closed_forms.displacement_matrices import POWERS, SIZE, motion_parts, rho
 from mbs.closed_forms.sequence import ZERO, Problem
 from mbs.recursions.chain import Ring
-from mbs.spatial import Pose
 
 # Known quantities of a search: joints, and sums of joint angles.
 
@@ -165,101 +166,6 @@ def _samples(problem: Problem, ring: Ring) -> LoopSamples:
     return LoopSamples(gaps, np.where(prismatic, q / length, q))
 
 
-# Rigid transforms as 15 x 15 matrices that act on the invariants of a point and a line.
-#
-# For a point p and a direction l, the vector w = (1, p.p, p.l, p, l, p x l, (p.p) l - 2 (p.l) p)
-# transforms linearly under each rigid transform. A product of transforms is a product of these
-# matrices.
-#
-# Source: Raghavan & Roth 1993, section 4, whose fourteen equations are the rows of w.
-
-
-SIZE = 15
-POWERS = (0, 2, 1, 1, 1, 1, 0, 0, 0, 1, 1, 1, 2, 2, 2)
-"""Power of a length in each element of w."""
-
-_P, _L, _X, _M = slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15)
-
-
-def represented(T: Matrix) -> Matrix:
-    """Return matrices (..., 15, 15) of transforms (..., 4, 4) that act on the vector w."""
-    R, t = T[..., :3, :3], T[..., :3, 3]
-    tt, cross = np.sum(t * t, axis=-1)[..., None, None], _skew(t)
-    back = np.einsum("...ji,...j->...i", R, t)
-    D = np.zeros((*T.shape[:-2], SIZE, SIZE))
-    D[..., range(3), range(3)] = 1.0
-    for block in (_P, _L, _X, _M):
-        D[..., block, block] = R
-    D[..., 1, 0], D[..., 1, _P] = tt[..., 0, 0], 2 * back
-    D[..., 2, _L], D[..., _P, 0], D[..., _X, _L] = back, t, cross @ R
-    outer = t[..., :, None] * back[..., None, :]
-    D[..., _M, _X], D[..., _M, _L], D[..., _M, 2] = -2 * cross @ R, tt * R - 2 * outer, -2 * t
-    return D
-
-
-def represented_pose(pose: Pose, opposite: Pose) -> SX:
-    """Return the matrix (15, 15) of a pose that acts on w, as a sparse expression.
-
-    Args:
-        pose: pose of a frame.
-        opposite: its inverse, whose expressions may be shorter.
-    """
-    R, t, back = pose.R, pose.p, -opposite.p
-    tt = min((casadi.sumsqr(p) for p in (t, opposite.p)), key=casadi.n_nodes)
-    cross = casadi.skew(t)
-    turned = casadi.mtimes(cross, R)
-    D = SX(SIZE, SIZE)
-    D[0, 0] = D[1, 1] = D[2, 2] = 1
-    for block in (_P, _L, _X, _M):
-        D[block, block] = R
-    D[1, 0], D[1, _P], D[2, _L] = tt, 2 * back.T, back.T
-    D[_P, 0], D[_X, _L], D[_M, 2] = t, turned, -2 * t
-    D[_M, _X] = -2 * turned
-    D[_M, _L] = tt * R - 2 * casadi.mtimes(t, back.T)
-    return SX(casadi.sparsify(D))
-
-
-def joint_basis(prismatic: bool) -> Matrix:
-    """Return factors (3, 15, 15) of 1, cos q, sin q (rotation), or of 1, r, r^2 (translation)."""
-    T = np.broadcast_to(np.eye(4), (3, 4, 4)).copy()
-    if prismatic:
-        T[1, 2, 3], T[2, 2, 3] = 1.0, -1.0
-        one, up, down = represented(T)
-        return np.array([one, (up - down) / 2, (up + down) / 2 - one])
-    T[1, :2, :2], T[2, :2, :2] = [[0, -1], [1, 0]], [[-1, 0], [0, -1]]
-    one, quarter, half = represented(T)
-    mean = (one + half) / 2
-    return np.array([mean, (one - half) / 2, quarter - mean])
-
-
-def motion(q: Matrix, prismatic: bool) -> Matrix:
-    """Return (..., 4, 4) transforms: translation along z, or rotation about z, by q."""
-    T = np.zeros((*q.shape, 4, 4))
-    T[..., range(4), range(4)] = 1.0
-    if prismatic:
-        T[..., 2, 3] = q
-        return T
-    c, s = np.cos(q), np.sin(q)
-    T[..., 0, 0], T[..., 0, 1], T[..., 1, 0], T[..., 1, 1] = c, -s, s, c
-    return T
-
-
-def inverse(T: Matrix) -> Matrix:
-    """Return the inverses (..., 4, 4) of rigid transforms."""
-    back = np.zeros_like(T)
-    R = np.swapaxes(T[..., :3, :3], -1, -2)
-    back[..., :3, :3], back[..., 3, 3] = R, 1.0
-    back[..., :3, 3] = -np.einsum("...ij,...j->...i", R, T[..., :3, 3])
-    return back
-
-
-def _skew(t: Matrix) -> Matrix:
-    """Return the matrices (..., 3, 3) of the cross product with vectors t (..., 3)."""
-    S = np.zeros((*t.shape, 3))
-    S[..., 0, 1], S[..., 0, 2], S[..., 1, 2] = -t[..., 2], t[..., 1], -t[..., 0]
-    return S - np.swapaxes(S, -1, -2)
-
-
 Tensor = NDArray[np.complex128]
 
 _MOST = 4
@@ -349,8 +255,8 @@ def _splits_to(
     (e, moves), (point, axis) = joint, end
     samples = len(pieces.gaps[0])
     first = np.broadcast_to(seed, (samples, *seed.shape)).astype(complex)
-    left = _walk_back(pieces, first, e, moves and point % 2 == 1)
-    right = _walk_on(pieces, first, e, moves and point % 2 == 0)
+    left = _walk(pieces, first, e, moves and point % 2 == 1, forward=False)
+    right = _walk(pieces, first, e, moves and point % 2 == 0, forward=True)
     for start, side in left.items():
         other = right.get(start)
         if other is None or start == point:
@@ -374,45 +280,28 @@ def _new_rows(axis: int, start: int, prismatic: bool) -> tuple[int, ...]:
     return (6, 7) if after else (6, 7, 8)
 
 
-def _walk_back(pieces: _Pieces, first: Tensor, e: int, turned: bool) -> Mapping[int, Side]:
-    """Return the observed vectors in the frames before joint e, by frame index.
+def _walk(
+    pieces: _Pieces, first: Tensor, e: int, turned: bool, forward: bool
+) -> Mapping[int, Side]:
+    """Return the observed vectors in the frames on one path from joint e, by frame index.
 
-    `first` are the vectors in the frame of joint e; `turned` is whether its motion acts on them.
+    `first` are the vectors in the frame of joint e; `turned` is whether its motion acts on them,
+    and `forward` the direction of the path along the loop.
     """
+    gaps, turns = (pieces.back, pieces.turns_back) if forward else (pieces.gaps, pieces.turns)
     m, found = len(pieces.joints), dict[int, Side]()
-    side = Side((), first[..., None])
+    side, j = Side((), first[..., None]), e
     if turned:
-        side = _with_joint(side, pieces.joints[e], pieces.turns[e])
-    for step in range(m):
-        j = (e - step) % m
-        found[2 * pieces.joints[j]] = side
-        side = _multiplied(side, pieces.gaps[j])
-        before = (j - 1) % m
-        found.setdefault(2 * pieces.joints[before] + 1, side)
+        side = _with_joint(side, pieces.joints[e], turns[e])
+    for _ in range(m):
+        found[2 * pieces.joints[j] + forward] = side
+        following = (j + 1 if forward else j - 1) % m
+        side = _multiplied(side, gaps[following if forward else j])
+        found.setdefault(2 * pieces.joints[following] + (not forward), side)
         if len(side.joints) == _MOST:
             break
-        side = _with_joint(side, pieces.joints[before], pieces.turns[before])
-    return found
-
-
-def _walk_on(pieces: _Pieces, first: Tensor, e: int, turned: bool) -> Mapping[int, Side]:
-    """Return the observed vectors in the frames after joint e, by frame index.
-
-    `first` are the vectors in the frame of joint e; `turned` is whether its motion acts on them.
-    """
-    m, found = len(pieces.joints), dict[int, Side]()
-    side = Side((), first[..., None])
-    if turned:
-        side = _with_joint(side, pieces.joints[e], pieces.turns_back[e])
-    for step in range(m):
-        j = (e + step) % m
-        found[2 * pieces.joints[j] + 1] = side
-        after = (j + 1) % m
-        side = _multiplied(side, pieces.back[after])
-        found.setdefault(2 * pieces.joints[after], side)
-        if len(side.joints) == _MOST:
-            break
-        side = _with_joint(side, pieces.joints[after], pieces.turns_back[after])
+        j = following
+        side = _with_joint(side, pieces.joints[j], turns[j])
     return found
 
 
@@ -438,8 +327,8 @@ def _pieces(knowledge: KnownFrames, block: slice) -> _Pieces:
     """
     joints = knowledge.unknown
     gaps = [_merged_transform(knowledge, k) for k in joints]
-    ways = [represented(T)[:, block, block] for T in gaps]
-    back = [represented(inverse(T))[:, block, block] for T in gaps]
+    ways = [rho(T)[:, block, block] for T in gaps]
+    back = [rho(inverse(T))[:, block, block] for T in gaps]
     turns = [_joint_factors(knowledge, k, 1)[:, block, block] for k in joints]
     turns_back = [_joint_factors(knowledge, k, -1)[:, block, block] for k in joints]
     prismatic = frozenset(k for k in joints if not knowledge.ring.joints[k].is_rotational)
@@ -465,7 +354,7 @@ def _joint_factors(knowledge: KnownFrames, k: int, direction: int) -> Tensor:
     The direction is 1 along the loop and -1 against it.
     """
     joint = knowledge.ring.joints[k]
-    one, first, second = joint_basis(not joint.is_rotational)
+    one, first, second = motion_parts(not joint.is_rotational)
     if not joint.is_rotational:
         return np.array([direction * joint.sign * first, one, second], dtype=complex)
     up = (first - 1j * direction * joint.sign * second) / 2

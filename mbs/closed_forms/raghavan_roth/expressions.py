@@ -15,11 +15,9 @@ import numpy as np
 from casadi import DM, SX
 from numpy.typing import NDArray
 
+from mbs.closed_forms.displacement_matrices import SIZE, SLOPES, Array
 from mbs.closed_forms.raghavan_roth.numbers import (
     REGULAR,
-    SIZE,
-    SLOPES,
-    Array,
     Elimination,
     Pencil,
     at,

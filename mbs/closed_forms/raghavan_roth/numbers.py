@@ -7,128 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mbs.closed_forms.arm import Arm, Field, inverse, motion
+from mbs.closed_forms.arm import Arm, inverse, motion
+from mbs.closed_forms.displacement_matrices import (
+    LINEAR,
+    SIZE,
+    Array,
+    back_parts,
+    frame_products,
+    half_parts,
+    motion_parts,
+    rho,
+)
 from mbs.errors import ModelError
 from mbs.numbers import NONZERO
-
-# A point p and a direction l as fifteen numbers w, which each rigid displacement maps linearly.
-#
-# w(p, l) = (1, p.p, p.l, p, l, p x l, p.p l - 2 (p.l) p). A displacement D maps p to R p + t and
-# l to R l. Then w(D p, D l) = rho(D) w(p, l), with rho(D D') = rho(D) rho(D').
-#
-# Source: Raghavan & Roth 1993, the fourteen equations; here as a representation of the group.
-
-
-Array = NDArray[np.float64]
-
-SIZE = 15
-
-#: Indices of the elements without p.p and p.p l - 2 (p.l) p, in which a displacement r appears
-# without r^2.
-LINEAR = np.array([0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11])
-
-
-def _skew(t: Array) -> Array:
-    """Return the matrix (3, 3) of the cross product with t (3,)."""
-    return np.array([[0, -t[2], t[1]], [t[2], 0, -t[0]], [-t[1], t[0], 0]])
-
-
-def _rho_derivative(t: Array) -> Array:
-    """Return the derivative (15, 15) of rho along a translation t."""
-    X = np.zeros((SIZE, SIZE))
-    X[1, 3:6] = 2 * t
-    X[2, 6:9] = t
-    X[3:6, 0] = t
-    X[9:12, 6:9] = _skew(t)
-    X[12:15, 9:12] = -2 * _skew(t)
-    X[12:15, 2] = -2 * t
-    return X
-
-
-def _rho_rotation_parts() -> Array:
-    """Return parts (3, 15, 15) of rho of a rotation about z: constant, cosine and sine."""
-    Z = np.zeros((3, SIZE, SIZE))
-    Z[0, range(3), range(3)] = 1.0
-    for k in (3, 6, 9, 12):
-        Z[0, k + 2, k + 2] = Z[1, k, k] = Z[1, k + 1, k + 1] = Z[2, k + 1, k] = 1.0
-        Z[2, k, k + 1] = -1.0
-    return Z
-
-
-#: (3, 15, 15) derivatives X of rho along x, y, z. For a translation, rho is 1 + X + X X / 2.
-SLOPES = np.array([_rho_derivative(axis) for axis in np.eye(3)])
-#: (3, 15, 15) parts of rho of a rotation q about z, with 1, cos q, sin q.
-TURN = _rho_rotation_parts()
-#: (3, 15, 15) parts of rho of a displacement r along z, with 1, r, r^2.
-SLIDE = np.array([np.eye(SIZE), SLOPES[2], 0.5 * SLOPES[2] @ SLOPES[2]])
-
-#: (6,) indices of the elements that are invariant under a rotation about z, and (6,) of elements
-# that are invariant under a translation along z.
-KEPT_BY_TURN = np.array([1, 2, 5, 8, 11, 14])
-KEPT_BY_SLIDE = np.array([3, 4, 6, 7, 8, 11])
-
-
-def pair(T: Field) -> Field:
-    """Return w (..., 15) of the origin and the z axis of frames.
-
-    Args:
-        T: (..., 4, 4) poses.
-    """
-    p, z = T[..., :3, 3], T[..., :3, 2]
-    pp, pz = np.sum(p * p, axis=-1)[..., None], np.sum(p * z, axis=-1)[..., None]
-    bent = pp * z - 2 * pz * p
-    return np.concatenate([np.ones_like(pp), pp, pz, p, z, np.cross(p, z), bent], axis=-1)
-
-
-def rho(T: Array) -> Array:
-    """Return the matrices (..., 15, 15) of displacements that act on w; see `pair`.
-
-    Args:
-        T: (..., 4, 4) rigid displacements.
-    """
-    X = np.tensordot(T[..., :3, 3], SLOPES, axes=1)
-    turned = np.zeros((*T.shape[:-2], SIZE, SIZE), T.dtype)
-    turned[..., range(3), range(3)] = 1.0
-    for k in (3, 6, 9, 12):
-        turned[..., k : k + 3, k : k + 3] = T[..., :3, :3]
-    moved: Array = (np.eye(SIZE) + X + 0.5 * X @ X) @ turned
-    return moved
-
-
-def motion_parts(prismatic: bool) -> Array:
-    """Return parts (3, 15, 15) of rho of a joint motion.
-
-    They are factors of 1, cos q, sin q for a revolute joint, of 1, r, r^2 for a prismatic joint.
-
-    Args:
-        prismatic: whether the joint is prismatic.
-    """
-    return SLIDE if prismatic else TURN
-
-
-def back_parts(prismatic: bool) -> Array:
-    """Return parts (3, 15, 15) of rho of the inverse motion of a joint, as in `motion_parts`.
-
-    Args:
-        prismatic: whether the joint is prismatic.
-    """
-    signs = np.array([1.0, -1.0, 1.0] if prismatic else [1.0, 1.0, -1.0])
-    back: Array = signs[:, None, None] * motion_parts(prismatic)
-    return back
-
-
-def half_parts(prismatic: bool) -> Array:
-    """Return parts (3, 15, 15) of rho of a joint with 1, x, x^2: (1 + x^2) rho for a rotation.
-
-    The variable x is tan(q/2) for a rotation, and the displacement r for a translation.
-
-    Args:
-        prismatic: whether the joint is prismatic.
-    """
-    if prismatic:
-        return SLIDE
-    return np.array([TURN[0] + TURN[1], 2 * TURN[2], TURN[0] - TURN[1]])
-
 
 # Equations of a loop in three of its joints, and the matrix that is singular at a solution.
 #
@@ -191,7 +82,7 @@ class Elimination:
         Args:
             ways: (N, 6, 4, 4) constant transforms of the loop.
         """
-        u = pair(inverse(ways[:, 5]))[:, self.elements]
+        u = frame_products(inverse(ways[:, 5]))[:, self.elements]
         once = self._carry(inverse(ways[:, 0]), np.einsum("jab,nb->naj", self.first, u))
         twice = np.einsum("iab,nbj->naij", self.second, once)
         return self._carry(inverse(ways[:, 1]), twice.reshape(*u.shape, -1))[:, 1:]
@@ -202,7 +93,7 @@ class Elimination:
         Args:
             ways: (N, 6, 4, 4) constant transforms of the loop.
         """
-        w = pair(ways[:, 4])[:, self.elements]
+        w = frame_products(ways[:, 4])[:, self.elements]
         once = self._carry(ways[:, 3], np.einsum("jab,nb->naj", self.fifth, w))
         twice = np.einsum("iab,nbj->naij", self.fourth, once)
         twice = self._carry(ways[:, 2], twice.reshape(*w.shape, -1))
@@ -407,13 +298,10 @@ class Arrangement:
             T: (N, 4, 4) target poses [m].
         """
         T = _scale(T, self.length)
+        pose = inverse(T) if self.sign > 0 else T
         ways = np.broadcast_to(self.ways, (len(T), 6, 4, 4)).copy()
-        ways[:, self.index] = ways[:, self.index] @ self._pose(T) @ self.after
+        ways[:, self.index] = ways[:, self.index] @ pose @ self.after
         return ways
-
-    def _pose(self, T: Array) -> Array:
-        """Return the pose T (..., 4, 4), inverted if the loop runs along the arm."""
-        return inverse(T) if self.sign > 0 else T
 
     def configurations(self, u: Array) -> Array:
         """Return arm configurations (..., 6) [rad or m], with angles in [-pi, pi).

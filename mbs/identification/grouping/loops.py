@@ -22,7 +22,7 @@ from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.tree import Link
 from mbs.components import ConstantVelocity, Fixed
 from mbs.components.constraints import Constraint
-from mbs.components.joints import Freedom, Motion
+from mbs.components.joints import Motion
 from mbs.identification.grouping.numeric import dependence, plain
 from mbs.identification.grouping.rules import Key, lambda_transform, on_link
 from mbs.loops.reduction import reduction_matrix
@@ -104,13 +104,8 @@ def _shared_frame(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
         return Pose.identity(), ()
     slides = len(turning) < len(freedoms)
     if len(turning) == 1 and turning[0].motion is Motion.REVOLUTE:
-        return _axis_pose(turning[0]), _SYMMETRIC[:1] if slides else _SYMMETRIC
+        return Pose.rotation(align_z(turning[0].axis)), _SYMMETRIC[:1] if slides else _SYMMETRIC
     return Pose.identity(), () if slides else _SYMMETRIC[2:]
-
-
-def _axis_pose(freedom: Freedom) -> Pose:
-    """Return the pose that rotates the z axis onto the axis of a joint freedom."""
-    return Pose.rotation(align_z(freedom.axis))
 
 
 def pair_relations(

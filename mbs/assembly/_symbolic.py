@@ -186,7 +186,10 @@ def symbolic(system: System, what: Sequence[str]) -> System:
 
 
 def _names(system: System, what: Sequence[str]) -> list[str]:
-    """Return the requested names as a list. Raise ModelError for another type or repeated names."""
+    """Return the requested names `what`, a name or a list of names, as a list.
+
+    Raises ModelError for another type or repeated names.
+    """
     if not isinstance(what, (str, list, tuple)):
         raise ModelError(
             f"{system.name}: what is to be symbols is {quoted(what)}; give names such as"
@@ -219,7 +222,7 @@ def _choose(system: System, names: Sequence[str]) -> list[Adjustable]:
 
 
 def _is_number(row: Adjustable) -> bool:
-    """Whether the value of an adjustable is a number and not an expression."""
+    """Whether the value of the adjustable `row` is a number and not an expression."""
     return bool(row.value.is_constant())
 
 
@@ -232,7 +235,7 @@ def _is_itself(row: Adjustable, parameters: set[str]) -> bool:
 
 
 def _check_number(system: System, row: Adjustable) -> None:
-    """Raise ModelError if the value is an expression of other symbols."""
+    """Raise ModelError if the value of the adjustable `row` is an expression of other symbols."""
     own = {parameter.name for parameter in system.parameters}
     if not _is_number(row) and not _is_itself(row, own):
         names = ", ".join(dict.fromkeys(s.name() for s in casadi.symvar(row.value)))
@@ -245,6 +248,8 @@ def _numbers_of_body(system: System, rows: Sequence[Adjustable], name: str) -> l
     """Return the ten inertial parameters of the link of the body `name` that are not symbols yet.
 
     Raises ModelError if there is no such body, or if its link has further bodies with mass.
+
+    `rows` are the numbers of the system that may become symbols.
     """
     links = {body.name: body.link for body in system.bodies}
     if name not in links:
@@ -264,7 +269,10 @@ def _numbers_of_body(system: System, rows: Sequence[Adjustable], name: str) -> l
 
 
 def _check_welds(system: System, rows: Sequence[Adjustable]) -> None:
-    """Raise ModelError if each body of a link with inertial symbols is carried by a Fixed joint."""
+    """Raise ModelError if all bodies of a link with inertial symbols are carried by Fixed joints.
+
+    `rows` are the numbers that become symbols.
+    """
     for number in sorted({int(r.owner[1]) for r in rows if r.kind in TEN_PARAMETERS}):
         carriers = [j for j in system.joints if j.part is not None and j.frame_b[0] == number]
         bodies = [body.name for body in system.bodies if body.link == number + 1]
@@ -354,6 +362,8 @@ def _joint(row: JointRow, cuts: Sequence[Cut], given: _Given) -> JointRow:
     """Return the row of a joint with its frames at the changed positions of its cut joint.
 
     The row is unchanged if it has no cut joint with symbols.
+
+    `given` maps (joint, side) to the symbols of the positions of its frames.
     """
     moves = [
         m for cut in cuts if cut.edge.joint.name == row.name for m in _moved_frames(cut, given)

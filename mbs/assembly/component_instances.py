@@ -140,7 +140,7 @@ class ComponentInstance:
         return self.element.binds and not others
 
     def _unit(self, name: str) -> str:
-        """Return the unit of a declared quantity; an effort has the unit of its joint."""
+        """Return the unit of the declared quantity `name`; an effort has the unit of its joint."""
         unit = self.element.declared[name].unit
         return EFFORT_UNIT[self.levers[0].unit] if unit == EFFORT else unit
 
@@ -346,6 +346,8 @@ def _require_moving(
     """Raise AssemblyError if a component with forces or rows acts on bodies that cannot move.
 
     `names` are the components that it acts on.
+
+    `frames` are the links and poses of its points, `coordinates` its moment arms by name.
     """
     links = {link for link, _ in frames}
     bodiless = not frames and not coordinates  # such as a capacitor, which has no ports
@@ -361,7 +363,7 @@ def _require_moving(
 
 
 def _place_text(names: Sequence[str]) -> str:
-    """Return text on the components that a component acts on: "on a" or "between a and b"."""
+    """Return text on where a component acts: "on a" or "between a and b", for component `names`."""
     return f"between {listed(names)}" if len(names) > 1 else f"on {names[0]}"
 
 
@@ -397,7 +399,7 @@ def _moment_arm(
 def _wires(
     mechanism: Description, sensors: Sequence[AttachedSensor]
 ) -> dict[tuple[str, str], WireSource]:
-    """Return the source of every wired input, by component and name.
+    """Return the source of every wired input, a dict with keys (component, input).
 
     Raises:
         AssemblyError: the source of a wire is no signal, or its ends have different units.

@@ -223,7 +223,7 @@ def layout(graph: Connections) -> Layout:
 
 
 def _chain(graph: Connections) -> list[int]:
-    """Return the link numbers of an unbranched chain in order, or an empty list."""
+    """Return the link numbers of `graph` in order if it is one unbranched chain, else []."""
     here, found = 0, [0]
     while graph.children[here]:
         if len(graph.children[here]) > 1:
@@ -234,7 +234,7 @@ def _chain(graph: Connections) -> list[int]:
 
 
 def _cuts_below(graph: Connections) -> dict[int, tuple[ConnectionEdge, ...]]:
-    """Return for each link the cut joints to draw below it.
+    """Return for each link number of `graph` the cut joints to draw below it.
 
     A cut joint is drawn below the end link with fewer cut joints, and not below the base if
     possible.
@@ -305,7 +305,11 @@ class _Layout:
         return max(_box_size(self.graph.nodes[number])[0], needed)
 
     def branch(self, edge: ConnectionEdge) -> float:
-        """Return the width [px] of a joint with all parts below it."""
+        """Return the width [px] of a joint with all parts below it.
+
+        Args:
+            edge: joint.
+        """
         return max(pill_width(edge), self.width(edge.ends[1]))
 
     def place(self, number: int, left: float, y: float, above: frozenset[int]) -> None:
@@ -492,7 +496,7 @@ def _style(theme: Theme) -> Iterator[str]:
 
 
 def _box(placed: PlacedNode) -> str:
-    """Return the SVG text of the box of a link."""
+    """Return the SVG text of the box of the placed link."""
     base = placed.node.number == 0
     left, top = placed.x - placed.width / 2, placed.y - placed.height / 2
     rect = (
@@ -511,7 +515,7 @@ def _box(placed: PlacedNode) -> str:
 
 
 def _joint_label(placed: PlacedEdge) -> str:
-    """Return the SVG text of the label of a joint."""
+    """Return the SVG text of the label of the placed joint, a rounded rectangle with its name."""
     edge = placed.edge
     look = f"{' active' if edge.driven else ''}{' loop' if edge.cut else ''}"
     left, top = placed.x - placed.width / 2, placed.y - PILL / 2
@@ -550,13 +554,13 @@ def _wire(path: str, more: str = "") -> str:
 
 
 def _rises(placed: Layout, pill: PlacedEdge) -> bool:
-    """Whether the second link of a cut joint is an ancestor of the link below which it is drawn."""
+    """Whether the second link of cut joint `pill` is an ancestor of the link it is drawn below."""
     owner, other = pill.edge.ends
     return other in placed.ancestors[owner]
 
 
 def _path_down(node: PlacedNode, pill: PlacedEdge) -> str:
-    """Return SVG path from a link to a joint label below it, or at the top of the next column."""
+    """Return SVG path from a link `node` to a joint label `pill` below it or in the next column."""
     foot = node.y + node.height / 2
     if pill.y > foot:
         bend = (foot + pill.y - PILL / 2) / 2
@@ -607,7 +611,10 @@ def _path_to_bottom(pill: PlacedEdge, other: PlacedNode, order: int, placed: Lay
 
 
 def _notes(remarks: tuple[str, ...], height: float) -> Iterator[str]:
-    """Yield the SVG texts of the couplings and of the legend, at the bottom of a picture."""
+    """Yield SVG texts of the couplings (`remarks`) and of the legend, at the bottom of a picture.
+
+    `height` is that of the picture [px].
+    """
     y = height - 18
     for k, remark in enumerate(remarks):
         row = y - 26 - LINE * (len(remarks) - 1 - k)

@@ -237,6 +237,8 @@ def _flange_rotations(
     """Return the reference flange of each rigid group of flanges, and the rotation of every flange.
 
     The first dict has the names of the coordinates as keys, the second the keys of the flanges.
+
+    `parts` are the components of the drive line.
     """
     ties = _rigid_connections(mechanism, parts)
     values = _generic(mechanism)
@@ -291,7 +293,11 @@ def _candidates(mechanism: Description, parts: tuple[Custom, ...]) -> Iterator[t
 def _rigid_connections(
     mechanism: Description, parts: tuple[Custom, ...]
 ) -> dict[Key, list[tuple[Key, Expression]]]:
-    """Return for each flange the rigidly connected flanges and their angle ratios."""
+    """Return for each flange the rigidly connected flanges and their angle ratios.
+
+    The dict has the keys of flanges; its values are lists of (key, ratio). `parts` are components
+    of the drive line.
+    """
     ties: dict[Key, list[tuple[Key, Expression]]] = {}
 
     def tie(a: Flange, b: Flange, ratio: Expression) -> None:
@@ -322,12 +328,12 @@ def times(a: Scalar, b: Scalar) -> Expression:
 
 
 def _plus(a: Expression, b: Expression) -> Expression:
-    """Return the sum of two expressions without exact zeros."""
+    """Return a + b; the other term alone if one is exactly zero."""
     return b if a == _ZERO else a if b == _ZERO else a + b
 
 
 def _equal(a: Expression, b: Expression, values: Mapping[str, float]) -> bool:
-    """Whether two gear ratios are equal at the parameter values, up to rounding.
+    """Whether two gear ratios a and b are equal at the parameter `values`, up to rounding.
 
     Expressions without value are compared as such.
     """
@@ -421,6 +427,8 @@ def _moment_arms(
     """Return the moment arms of a force between shafts, as pairs of coordinate and factor.
 
     Raises AssemblyError if both of its flanges are on one rigid shaft.
+
+    `part` is the force and `turns` the rotation of each flange, by its key.
     """
     levers = []
     for flange, share in part.shares:

@@ -191,7 +191,10 @@ def _welds(
 def _require_connected(
     mechanism: Description, welds: Mapping[Port, list[tuple[Port, Pose]]]
 ) -> None:
-    """Raise AssemblyError if a body or a joint frame has no connection."""
+    """Raise AssemblyError if a body or a joint frame has no connection.
+
+    `welds` are the welded ports of each port.
+    """
     for (name, side), neighbours in welds.items():
         if not neighbours and name != mechanism.world.name:
             component: Component = mechanism.components[name]
@@ -229,17 +232,22 @@ class _Evaluator:
     """Callable from an expression to its numeric value at fixed values of the parameters."""
 
     def __init__(self, symbols: Mapping[str, SX], values: Mapping[str, float]) -> None:
+        """Prepare evaluation at `values` by name of the parameters in `symbols`."""
         self.p = casadi.vertcat(*symbols.values()) if symbols else SX(0, 1)
         self.values = [values[name] for name in symbols]
 
     def __call__(self, value: SX) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+        """Return the numeric value of an expression, as an array of its shape."""
         if not casadi.symvar(value):
             return np.array(casadi.DM(value))
         return np.array(casadi.Function("f", [self.p], [value])(self.values))
 
 
 def _require_same_place(port: Port, first: Pose, second: Pose, at: _Evaluator) -> None:
-    """Raise AssemblyError if two paths of welds give different poses of a port."""
+    """Raise AssemblyError if two paths of welds give different poses of a port.
+
+    `first` and `second` are the two poses, `at` evaluates expressions.
+    """
     difference = at(first.matrix - second.matrix)
     gap = float(np.linalg.norm(difference[:3, 3]))
     chord = float(np.linalg.norm(difference[:3, :3])) / (2 * np.sqrt(2))
@@ -279,7 +287,11 @@ def _edge(
 
 
 def _size(nodes: int, edges: Sequence[JointEdge], at: _Evaluator) -> float:
-    """Return the largest distance between two joints of one body; 1 if there is none [m]."""
+    """Return the largest distance between two joints of one body [m]; 1 if there is none.
+
+    `nodes` is the number of bodies, `edges` the joints between them, and `at` evaluates
+    expressions.
+    """
     points = at(casadi.horzcat(SX(3, 0), *(p for e in edges for p in (e.pose_a.p, e.pose_b.p))))
     on: list[list[Any]] = [[] for _ in range(nodes)]
     for number, edge in enumerate(edges):
@@ -296,7 +308,10 @@ def _size(nodes: int, edges: Sequence[JointEdge], at: _Evaluator) -> float:
 def _given_khalil(
     mechanism: Description, joint: Joint, node: BodyNode, symbols: Mapping[str, SX]
 ) -> Khalil | None:
-    """Return Khalil parameters of frame_a relative to its node; None if described otherwise."""
+    """Return Khalil parameters of frame_a relative to its node; None if described otherwise.
+
+    `node` is the rigid group of bodies that carries frame_a.
+    """
     for a, b in mechanism.connections:
         if b.owner is joint and b.port == "a" and not b.placement.steps:
             steps = a.placement.steps
@@ -381,7 +396,7 @@ def spanning_tree(
 
 
 def _describe_unreached(name: str, graph: BodyGraph, number: int) -> str:
-    """Return the error message for a node without a path to the world."""
+    """Return error message for the node `number` without a path to the world, in system `name`."""
     holders = [e.joint for e in graph.edges if number in (e.a, e.b) and not e.joint.places]
     where = f"{name}: no chain of joints leads from the world to {graph.nodes[number].name!r}"
     if holders:
@@ -426,7 +441,10 @@ def _prim(graph: BodyGraph, need: set[str], keep: set[str], cut: set[str]) -> li
 
 
 def _depth_first(graph: BodyGraph, chosen: list[JointEdge]) -> list[Branch]:
-    """Return the joints of a tree as branches in depth-first order from the world."""
+    """Return the joints of a tree as branches in depth-first order from the world.
+
+    `chosen` are the joints of the tree.
+    """
     branches: list[Branch] = []
     rank = {id(edge): number for number, edge in enumerate(graph.edges)}
     ordered = sorted(chosen, key=lambda edge: rank[id(edge)])

@@ -343,6 +343,8 @@ class ModelFunction(Function):
         """Return every input by name, with the default of p.
 
         Raises ModelError for a missing, unknown or repeated input.
+
+        `args` and `kwargs` are the arguments of a call.
         """
         names = self._sizes
         given = dict(zip(names, args, strict=False))
@@ -417,7 +419,11 @@ class ModelFunction(Function):
         raise ModelError(f"{self._title}: {name} has {has}, it needs {expected}{known}")
 
     def _require_valid(self, inputs: dict[str, Any]) -> bool:
-        """Raise ModelError for invalid numbers; return whether outputs are to be verified."""
+        """Raise ModelError for invalid numbers; return whether outputs are to be verified.
+
+        `inputs` are the values by name. Outputs are verified if the configuration is nearly
+        singular.
+        """
         one = self._state_of_one() if self._asks else None
         if one is None:
             return False
@@ -610,7 +616,7 @@ def require_system(system: object) -> None:
 
 
 def _elements(system: System) -> dict[str, list[tuple[str, str]]]:
-    """Return (name, unit) of the elements of every input and output that a model may have."""
+    """Return lists of (name, unit) of elements, by the name of each input or output of models."""
     q = [(coordinate.name, coordinate.unit) for coordinate in system.coordinates]
     free = [system.speeds[k] for k in system.free]
     units = {"v": _SAME_UNIT, "a": ACCELERATION_UNIT, "tau": EFFORT_UNIT}

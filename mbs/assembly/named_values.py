@@ -186,7 +186,10 @@ def _filled(
 
 
 def _numbers(system: SystemData, values: Any, what: str) -> list[float]:
-    """Return values as a list of finite floats; raise ModelError for any other value."""
+    """Return `values` as a list of finite floats.
+
+    Raises ModelError for any other value; `what` names the values in its message.
+    """
     if isinstance(values, (list, tuple)):  # numpy makes no array of several (1, 1) of CasADi
         values = [float(x) if isinstance(x, DM) and x.numel() == 1 else x for x in values]
     array = numbers_given(values)
@@ -206,7 +209,10 @@ def _numbers(system: SystemData, values: Any, what: str) -> list[float]:
 
 
 def _number(system: SystemData, value: Any, what: str) -> float:
-    """Return a value as a float; raise ModelError unless it is a single finite number."""
+    """Return `value` as a float.
+
+    Raises ModelError unless it is a single finite number; `what` names it in the message.
+    """
     numbers = _numbers(system, value, what)
     if len(numbers) != 1:
         raise ModelError(f"{system.name}: the {what} has {len(numbers)} values; give one number")

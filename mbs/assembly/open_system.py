@@ -179,7 +179,10 @@ def _driven_joints(mechanism: Description) -> set[str]:
 def _loop_rows(
     mechanism: Description, framed: KhalilTree, parts: Sequence[ComponentInstance]
 ) -> tuple[LoopRow, ...]:
-    """Return the rows of the table of loops: cut joints, couplings and binding components."""
+    """Return the table of loops: cut joints, couplings, and components that constrain velocities.
+
+    `framed` is the tree with its cut joints, and `parts` are the equation-based components.
+    """
     loops = [
         LoopRow(
             name=cut.edge.joint.name,
@@ -199,7 +202,10 @@ def _loop_rows(
 
 
 def _bound_joints(framed: KhalilTree, part: ComponentInstance) -> tuple[str, ...]:
-    """Return the names of the joints that move the ports of a component."""
+    """Return the names of the joints that move the ports of a component.
+
+    `framed` is the tree with its frames.
+    """
     links = [k for link, _ in part.frames for k in framed.tree.path(link)]
     names = [framed.joints[k] for k in sorted(set(links))]
     return tuple(dict.fromkeys([*names, *(lever.name for lever in part.levers)]))
@@ -312,6 +318,8 @@ def _couplings(
     """Return the relations between coordinates by their indices in q.
 
     Raises AssemblyError if a coordinate is not in the tree.
+
+    `coordinates` are the elements of q.
     """
     numbers = {coordinate.name: number for number, coordinate in enumerate(coordinates)}
     result = []

@@ -115,7 +115,7 @@ def _declared(component: Component) -> Iterator[tuple[str, Bounds]]:
 
 
 def _tighter(a: Bounds, b: Bounds) -> Bounds:
-    """Return the intersection of two pairs of bounds."""
+    """Return the intersection of two pairs of bounds (lower, upper); None means no bound."""
     lows = [bound for bound in (a[0], b[0]) if bound is not None]
     highs = [bound for bound in (a[1], b[1]) if bound is not None]
     return max(lows, default=None), min(highs, default=None)

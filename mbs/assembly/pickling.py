@@ -77,17 +77,20 @@ class _Pickler(pickle.Pickler):
     """Pickler that stores all SX in `graphs` and notes code of users in `names_alone`."""
 
     def __init__(self, buffer: io.BytesIO) -> None:
+        """Open a pickle that is written to `buffer`."""
         super().__init__(buffer, protocol=pickle.HIGHEST_PROTOCOL)
         self.graphs: list[SX] = []
         self.names_alone = False
 
     def persistent_id(self, obj: Any) -> int | None:
+        """Return index of an SX in `graphs`, to which it is added; None for any other object."""
         if not isinstance(obj, SX):
             return None
         self.graphs.append(obj)
         return len(self.graphs) - 1
 
     def reducer_override(self, obj: Any) -> Any:
+        """Set `names_alone` if `obj` is code of a user; return NotImplemented (default pickle)."""
         if isinstance(obj, (type, FunctionType)) and obj.__module__.split(".")[0] not in _KNOWN:
             self.names_alone = True
         if isinstance(obj, Function):  # a Callback of a user is in it by its name
@@ -100,8 +103,10 @@ class _Unpickler(pickle.Unpickler):
     """Unpickler of a pickle by `_Pickler`, with its SX in `graphs`."""
 
     def __init__(self, buffer: io.BytesIO, graphs: list[SX]) -> None:
+        """Open the pickle in `buffer`, whose SX are `graphs`."""
         super().__init__(buffer)
         self._graphs = graphs
 
     def persistent_load(self, pid: Any) -> Any:
+        """Return the SX with index `pid` in `graphs`."""
         return self._graphs[pid]

@@ -161,7 +161,7 @@ def _describe(
 
 
 def _placement(placement: Placement, known: Mapping[str, Array]) -> Array:
-    """Return the transform of a placement at the parameter values `known`."""
+    """Return the transform (..., 4, 4) of a placement at the parameter values `known`."""
     T: Array = np.eye(4)
     for step in placement.steps:
         match step:

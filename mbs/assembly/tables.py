@@ -380,6 +380,8 @@ def _part(
     """Return the bodies on the side of a Fixed joint that does not contain the world.
 
     None if other Fixed joints connect both sides as well.
+
+    `places` are link and pose of the frames, `symbols` those of the parameters.
     """
     sides = {port: _weld(mechanism, joint, port) for port in "ab"}
     if (joint.name, "a") in sides["b"]:
@@ -583,7 +585,10 @@ def attached_sensors(
 def _on_points(
     mechanism: Description, sensor: Sensor, places: Places, symbols: Mapping[str, SX]
 ) -> AttachedSensor:
-    """Return a sensor with the links and poses of its points."""
+    """Return a sensor with the links and poses of its points.
+
+    `places` are link and pose of bodies and joint frames.
+    """
     frames = []
     for point in sensor.points:
         require_part(mechanism, sensor, point, "is on")
@@ -602,7 +607,10 @@ def _on_points(
 def _on_joint(
     mechanism: Description, sensor: OnJoint, joints: Sequence[JointRow]
 ) -> AttachedSensor:
-    """Return a sensor with its joint. Raise AssemblyError if the joint is unknown or has no row."""
+    """Return a sensor with its joint and the frames of this joint, from the table `joints`.
+
+    Raises AssemblyError if the joint is unknown or not in the table.
+    """
     names = [row.name for row in joints]
     if sensor.joint not in names:
         known = {joint.name for joint in mechanism.joints()}
@@ -623,7 +631,10 @@ def _on_joint(
 def _on_coordinate(
     sensor: JointSensor, tables: tuple[Sequence[Coordinate], ...], joints: Sequence[JointRow]
 ) -> AttachedSensor:
-    """Return a sensor with the coordinate that it measures; AssemblyError if it is unknown."""
+    """Return a sensor with the coordinate that it measures; AssemblyError if it is unknown.
+
+    `tables` are the coordinates of q, of v, and of cut joints.
+    """
     q, v, cut = ({row.name: row for row in table} for table in tables)
     name = sensor.joint
     balls = {row.name: row for row in joints if row.cut and row.kind == "spherical"}
@@ -651,7 +662,10 @@ def _on_coordinate(
 def _require_names(
     sensors: Sequence[AttachedSensor], tables: tuple[Sequence[Coordinate], ...]
 ) -> None:
-    """Raise AssemblyError if two readings have the same name, in Functions or in results."""
+    """Raise AssemblyError if two readings have the same name, in Functions or in results.
+
+    `tables` are the coordinates of q, of v, and of cut joints.
+    """
     owners = dict.fromkeys(_INPUTS, "an input of the models")
     columns = {
         f"{row.name}.{kind}": f"coordinate {row.name}"

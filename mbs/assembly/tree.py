@@ -148,7 +148,7 @@ def position_rate(tree: Tree, q: SX, v: SX) -> SX:
 
 
 def _rate(link: Link, q: SX, v: SX) -> SX:
-    """Return the time derivative of the positions q of one link at its velocities v."""
+    """Return the time derivative (nq, 1) of the positions q of one link at its velocities v."""
     match link.motion:
         case Motion.SPHERICAL:
             return quaternion_rate(q, v)

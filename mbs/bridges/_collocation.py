@@ -153,7 +153,7 @@ def _residual(model: Model) -> Function:
 
 
 def _combine(basis: list[MX], weights: np.ndarray[Any, Any]) -> MX:
-    """Return the sum of matrices `basis` times numbers `weights`."""
+    """Return the sum of the matrices in `basis`, each times a number in `weights`; same shape."""
     terms = [float(w) * b for w, b in zip(weights, basis, strict=True)]
     total: MX = sum(terms[1:], terms[0])
     return total

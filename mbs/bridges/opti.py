@@ -282,10 +282,9 @@ def _require_count(what: str, count: Any) -> None:
 
 
 def _columns(name: str, values: ArrayLike, shape: tuple[int, int]) -> NDArray[np.float64]:
-    """Return a guess as an array of the full shape; a single column is repeated.
+    """Return the guess `values` of the variables `name` as an array of this shape.
 
-    Raises:
-        ModelError: the guess has another shape.
+    A single column is repeated. Raises ModelError if the guess has another shape.
     """
     try:
         array = np.array(values, dtype=float)

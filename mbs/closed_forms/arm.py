@@ -112,7 +112,10 @@ class Arm:
         return self._frames(q)[1:]
 
     def _frames(self, q: Array) -> tuple[Array, Array, Array]:
-        """Return end poses, and axes and origins (..., n, 3) of all joints, in the base frame."""
+        """Return end poses, and axes and origins (..., n, 3) of all joints in the base frame.
+
+        q (..., n) are positions of the joints; the poses are (..., 4, 4).
+        """
         q = np.asarray(q, dtype=float)
         *frames, T = transforms(self, q)
         axes, origins = np.empty((*q.shape, 3)), np.empty((*q.shape, 3))

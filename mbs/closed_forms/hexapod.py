@@ -161,7 +161,7 @@ def follow(path: Homotopy, x: Complex, tolerance: float = TOLERANCE) -> tuple[Co
 
 
 def _in_patch(x: Complex, slope: Complex) -> tuple[Complex, Complex]:
-    """Return roots scaled to length one, and slopes that keep this length to first order."""
+    """Return roots x (r, 8) scaled to length one, and slopes (r, 8) that keep it to first order."""
     size = np.linalg.norm(x, axis=1, keepdims=True)
     x, slope = x / size, slope / size
     return x, slope - np.sum(x.conj() * slope, axis=1, keepdims=True) * x
@@ -362,7 +362,7 @@ _IDLE = 3
 
 
 def _random_lengths(rng: np.random.Generator) -> Complex:
-    """Return random complex constants c (6,) of `PlatformLegs`, which determine leg lengths."""
+    """Return random complex constants c (6,) of `PlatformLegs`: they set the lengths of legs."""
     return rng.normal(size=LEGS) + 1j * rng.normal(size=LEGS)
 
 

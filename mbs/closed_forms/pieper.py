@@ -80,7 +80,11 @@ class PieperLoop:
         return next(joint for joint in self.problem.ring.joints if joint.name == name)
 
     def zero(self, values: SX) -> bool:
-        """Whether dimensionless expressions are zero in all closed configurations."""
+        """Whether dimensionless expressions are zero in all closed configurations.
+
+        Args:
+            values: expressions of the joint positions and the target.
+        """
         return self.problem.always_zero(values)
 
 
@@ -436,6 +440,9 @@ def _two_equations(reach: PointTarget) -> tuple[list[SX], list[SX], list[SX]]:
     """Return two equations a . (J2 f) = h that do not depend on joint 1.
 
     They are vectors a (3, 1), forms h (3, 1) in joint 3, and the typical sizes of h.
+
+    `reach` contains the target point and f, the point moved by joint 3; J2 is the motion of joint
+    2.
     """
     scene, R, t = reach.scene, reach.way.R, reach.way.p
     if not scene.ring.joints[0].is_rotational:
@@ -448,7 +455,10 @@ def _two_equations(reach: PointTarget) -> tuple[list[SX], list[SX], list[SX]]:
 
 
 def _second_revolute(reach: PointTarget) -> list[SequenceStep] | None:
-    """Return the steps of joints 3 and 2 for a revolute joint 2; None if they are undetermined."""
+    """Return the steps of joints 3 and 2 for a revolute joint 2; None if they are undetermined.
+
+    `reach` contains the target point and the point that joint 3 moves.
+    """
     scene = reach.scene
     (a, b), (h, k), (unit_h, unit_k) = _two_equations(reach)
     Z1, Z2 = h - a[2] * reach.f[2, :].T, k - b[2] * reach.f[2, :].T
@@ -499,7 +509,10 @@ def _parallel(
 
 
 def _second_prismatic(reach: PointTarget) -> list[SequenceStep] | None:
-    """Return the steps of joints 3 and 2 for a prismatic joint 2; None if they are undetermined."""
+    """Return the steps of joints 3 and 2 for a prismatic joint 2; None if they are undetermined.
+
+    `reach` contains the target point and the point that joint 3 moves.
+    """
     rows, forms, _ = _two_equations(reach)
     left = [h - casadi.mtimes(reach.f.T, a) for a, h in zip(rows, forms, strict=True)]
     if reach.scene.ring.joints[0].is_rotational:
@@ -544,7 +557,10 @@ def _revolute_then_prismatic(
 
 
 def _first_joint(reach: PointTarget) -> SequenceStep:
-    """Return the step of joint 1 once joints 2 and 3 are known."""
+    """Return the step of joint 1 once joints 2 and 3 are known.
+
+    `reach` contains the target point and the point that joint 3 moves.
+    """
     scene = reach.scene
     f = Pose.translation(casadi.mtimes(reach.f, basis(scene, 2)))
     w = (reach.way @ scene.motion(1) @ f).p
@@ -585,7 +601,10 @@ def three_displacements(scene: PieperLoop) -> list[SequenceStep]:
 
 
 def _displacements(scene: PieperLoop) -> SequenceStep:
-    """Return the step of the prismatic joints from the sum of translations around the loop."""
+    """Return the step of the prismatic joints from the sum of translations around the loop.
+
+    `scene` is the loop. Raises NoClosedForm if the prismatic joints move in one plane.
+    """
     path, indices, columns = Pose.identity(), list[int](), list[SX]()
     for k, (joint, gap) in enumerate(zip(scene.ring.joints, scene.ring.gaps, strict=True)):
         path = path @ gap.pose
@@ -728,7 +747,10 @@ def _arrangements(problem: Problem) -> list[PieperLoop]:
 
 
 def _pose_comes_first(scene: PieperLoop) -> bool:
-    """Whether the transform that contains the pose (the most symbols) follows joint 1."""
+    """Whether the transform that contains the pose (the most symbols) follows joint 1.
+
+    The loop is `scene`.
+    """
     counts = [len(casadi.symvar(gap.pose.matrix)) for gap in scene.ring.gaps]
     return counts[1] == max(counts)
 
@@ -784,7 +806,7 @@ def _common_normal(way: Pose) -> tuple[SX, SX, SX, SX]:
 
 
 def _refusal(names: list[str]) -> str:
-    """Return error message for a loop of these joints to which Pieper's method does not apply."""
+    """Return the error text on a loop of joints `names` to which Pieper's method does not apply."""
     return (
         f"no three neighbouring axes of {names[0]} .. {names[-1]} meet in a point and no three"
         " joints are prismatic, so that Pieper's method does not apply; use the general method"
@@ -792,7 +814,10 @@ def _refusal(names: list[str]) -> str:
 
 
 def _degenerate(scenes: list[PieperLoop]) -> str:
-    """Return the error text on joints that the target does not determine."""
+    """Return the error text on joints that the target does not determine.
+
+    The names of the joints are those of the first loop in `scenes`.
+    """
     joints = scenes[0].ring.joints
     first, last = (", ".join(joint.name for joint in part) for part in (joints[:3], joints[3:]))
     return (

@@ -208,7 +208,10 @@ def _planar_branches(ring: Ring, prismatic: list[int], q: SX, p: SX) -> LoopBran
 
 
 def _parallelogram_axis(ring: Ring, q: SX, p: SX) -> int | None:
-    """Return the index of the known axis that makes the loop a parallelogram; None without one."""
+    """Return the index of the known axis that makes the loop a parallelogram; None without one.
+
+    q and p are the symbols of positions and parameters.
+    """
     back = ring.gaps[0].pose.inverse()
     A, B = (square(in_plane(gap.pose.p)) for gap in ring.gaps[1:])
     for number, pivot in enumerate(ring.gaps[0].pivots):

@@ -193,7 +193,11 @@ def planar_roots(loops: PlanarLoops) -> PlanarRoots:
 
 
 def _solve(loops: PlanarLoops) -> tuple[Real, Real, list[_Found]]:
-    """Return angles (r, n) and displacements (r, m) of all roots, and the results of each part."""
+    """Return angles (r, n) and displacements (r, m) of all roots, and the results of each part.
+
+    `loops` are the rows of all loops; n and m are the numbers of unknown directions and
+    displacements.
+    """
     n, m = loops.counts
     if n + m == 0:
         closed = int(np.all(np.abs(loops.constant) < _DEPENDENT))
@@ -222,7 +226,7 @@ loops 252."""
 
 
 def _smallest_part(loops: PlanarLoops) -> PlanarPart:
-    """Return the smallest set of unknowns that some rows determine alone.
+    """Return the smallest set of unknowns that some rows of `loops` determine alone.
 
     Raises NoClosedForm if it has more than eight unknowns.
     """
@@ -337,7 +341,7 @@ dyad: rounding of lengths relative to the size."""
 
 
 def _dyad(loops: PlanarLoops) -> _Found:
-    """Return the real roots (up to two) of a single row with two unknowns."""
+    """Return the real roots of `loops` with a single row and two unknowns: none, one or two."""
     method = "the quadratic equation of a dyad"
     n, _ = loops.counts
     b = loops.constant[0]
@@ -437,7 +441,10 @@ def refine(loops: PlanarLoops, theta: Real, s: Real) -> tuple[Real, Real, Real]:
 
 
 def _distinct(loops: PlanarLoops, theta: Real, s: Real, residual: Real) -> tuple[Real, Real]:
-    """Return the different roots, each with the smallest `residual` (r,) among its copies."""
+    """Return the different roots, each with the smallest `residual` (r,) among its copies.
+
+    theta (r, n) and s (r, m) are the angles and displacements of the roots.
+    """
     kept = list[int]()
     for k in np.argsort(residual, kind="stable"):
         if not any(
@@ -552,7 +559,7 @@ class _Pencil:
 
 
 def _sign(order: tuple[int, ...]) -> int:
-    """Return the sign of a permutation."""
+    """Return the sign, 1 or -1, of the permutation `order` of 0, 1, ..."""
     swaps = sum(a > b for k, a in enumerate(order) for b in order[k + 1 :])
     return -1 if swaps % 2 else 1
 
@@ -670,7 +677,10 @@ def triad_roots(loops: PlanarLoops) -> _Found:
 
 
 def _best_triad(loops: PlanarLoops) -> _Triad | None:
-    """Return the triad with a hidden direction that leaves three circles or lines, or None."""
+    """Return a triad of `loops` with the first hidden direction that is possible, or None.
+
+    The rest of the equations are circles or lines of the complex number t of another direction.
+    """
     for hidden in range(loops.counts[0]):
         if all(k in (KNOWN, hidden) for k in loops.carriers):
             triad = _Triad.of(loops, hidden)

@@ -448,6 +448,8 @@ def _gauss_newton(function: Function, start: Vector, fixed: NDArray[np.bool_]) -
     """Return a closed configuration near `start` by Gauss-Newton; None if it does not converge.
 
     Elements of the mask `fixed` are kept.
+
+    `function` maps all positions to the closure error and its Jacobian.
     """
 
     def residual(free: Vector) -> tuple[Vector, Vector]:

@@ -53,6 +53,9 @@ class Problem:
         """Return the value of an expression of x and given at every sample.
 
         Further angles, which are not joint positions, are zero.
+
+        Args:
+            values: expression.
         """
         function = Function("values", [self.x, self.given], [values])
         rest = np.zeros(self.x.numel() - self.size)
@@ -61,7 +64,11 @@ class Problem:
         ]
 
     def always_zero(self, values: SX) -> bool:
-        """Whether all elements of an expression of x and given are zero at all samples."""
+        """Whether all elements of an expression of x and given are zero at all samples.
+
+        Args:
+            values: expression.
+        """
         return all(bool(np.all(np.abs(sample) < ZERO)) for sample in self.at_samples(values))
 
 
@@ -223,7 +230,7 @@ class StepSequence:
         return Leaf(SX(2 * self.size, 1), SX(0, 1), SX(0, 1), {})
 
     def _without_sums(self, leaf: Leaf) -> Leaf:
-        """Return a configuration without the positions that are sums of joints."""
+        """Return the configuration `leaf` without the positions that are sums of joint angles."""
         return Leaf(leaf.x[: self.size], leaf.real, leaf.regular, leaf.coefficients)
 
 
@@ -420,7 +427,10 @@ def real_quartic(
 
 
 def _symmetric(row: tuple[SX, SX, SX], second: tuple[SX, SX], last: SX) -> SX:
-    """Return the symmetric matrix (3, 3) [[a, b, c], [b, d, e], [c, e, last]]."""
+    """Return the symmetric matrix (3, 3) [[a, b, c], [b, d, e], [c, e, last]].
+
+    `row` is (a, b, c), `second` is (d, e).
+    """
     (a, b, c), (d, e) = row, second
     return casadi.reshape(casadi.vertcat(a, b, c, b, d, e, c, e, last), 3, 3)
 
@@ -488,7 +498,7 @@ def _adjugate(M: SX) -> SX:
 
 
 def _of_largest(sizes: list[SX], values: list[SX]) -> SX:
-    """Return the element of `values` that belongs to the largest of three `sizes`."""
+    """Return the element (1, 1) of three `values` that belongs to the largest of three `sizes`."""
     late = casadi.if_else(sizes[2] > sizes[1], values[2], values[1])
     first = casadi.logic_and(sizes[0] >= sizes[1], sizes[0] >= sizes[2])
     return SX(casadi.if_else(first, values[0], late))

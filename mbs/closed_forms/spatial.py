@@ -186,9 +186,11 @@ def confine(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def _normal(ring: Ring, q: SX, p: SX) -> SX | None:
-    """Return the normal of the plane of motion of joints 2 and 3, in the frame before joint 2.
+    """Return normal (3, 1) of the plane of motion of joints 2 and 3, in the frame before joint 2.
 
     None if they do not keep a point in a plane.
+
+    q and p are the symbols of positions and parameters.
     """
     second, third = (joint.motion is Motion.PRISMATIC for joint in ring.joints[1:3])
     between = ring.gaps[2].pose
@@ -321,7 +323,7 @@ def at_distance(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def _link_ends(span: RigidLink) -> tuple[SX, SX]:
-    """Return the ends of a link relative to the single other joint of its loop.
+    """Return both ends (3, 1) of rigid link `span` relative to the only other joint of its loop.
 
     These are the end in the frame before the joint, negated, and the start in the frame after it.
     """
@@ -457,6 +459,8 @@ def _directions(ring: Ring, q: SX, p: SX) -> tuple[Ring, frozenset[str]]:
     """Return the loop with one joint for each set of parallel joints, and names of such joints.
 
     The names are those of joints that represent several joints.
+
+    q and p are the symbols of positions and parameters.
     """
     shared, k = set[str](), 0
     while k < len(ring.joints) > 1:
@@ -573,7 +577,10 @@ def spin(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def _rod_branches(ring: Ring, joint: ChainJoint, q: SX) -> LoopBranches:
-    """Return the branch of a spherical joint of a rod, for a known spin about the rod."""
+    """Return the branch of a spherical joint of a rod, for a known spin about the rod.
+
+    `joint` is the spherical joint; the spin is an element of the positions q.
+    """
     before, after = ring.gaps[0].pose.inverse().p, ring.gaps[1].pose.p
     u, w = (after, before) if joint.sign > 0 else (before, after)
     u, w = u / casadi.norm_2(u), w / casadi.norm_2(w)
@@ -592,13 +599,13 @@ def _rod_branches(ring: Ring, joint: ChainJoint, q: SX) -> LoopBranches:
 
 
 def _shortest_rotation(a: SX, b: SX) -> SX:
-    """Return the quaternion that rotates the unit vector a onto b about their common normal."""
+    """Return quaternion (4, 1) that rotates the unit vector a onto b about their common normal."""
     whole = casadi.vertcat(1 + casadi.dot(a, b), cross(a, b))
     return SX(whole / casadi.norm_2(whole))
 
 
 def _quaternion_product(a: SX, b: SX) -> SX:
-    """Return the product of two quaternions w, x, y, z."""
+    """Return the Hamilton product a b (4, 1) of two quaternions, with the order w, x, y, z."""
     vector = a[0] * b[1:4] + b[0] * a[1:4] + cross(a[1:4], b[1:4])
     return casadi.vertcat(a[0] * b[0] - casadi.dot(a[1:4], b[1:4]), vector)
 
@@ -780,7 +787,11 @@ def _closing_angles(ring: Ring, known: Pose, q: SX, p: SX) -> list[list[Angle]]:
 
 
 def _has_equal_twists(ring: Ring, axes: _Axes, side: int, q: SX, p: SX) -> bool:
-    """Whether the twists of unknown links equal those of the opposite links, times `side` (+-1)."""
+    """Whether the twists of unknown links equal those of the opposite links, times `side` (+-1).
+
+    `axes` are the directions of the axes of the loop; q and p are the symbols of positions and
+    parameters.
+    """
     _, R2, R3 = (gap.pose.R for gap in ring.gaps)
     first = R2[2, 2] - side * casadi.dot(axes.before, axes.known)
     second = R3[2, 2] - side * casadi.dot(axes.after, axes.known)
@@ -804,7 +815,10 @@ def _angles(ring: Ring, axes: _Axes, swap: int, sense: int) -> list[Angle]:
 
 
 def _closure_gap(ring: Ring, angles: list[Angle]) -> SX:
-    """Return the closure error of the loop (16, 1): pose around the loop minus the identity."""
+    """Return the closure error of the loop (16, 1): pose around the loop minus the identity.
+
+    `angles` are the angles of all joints of the loop.
+    """
     pose = Pose.identity()
     for gap, angle in zip(ring.gaps, angles, strict=True):
         pose = pose @ gap.pose @ _rotation(angle)

@@ -339,6 +339,8 @@ def _column_indices(columns: Sequence[Column]) -> dict[Key, int]:
     """Return a dict from (0-based link index, kind) to the column index.
 
     Parameters of motors that are coupled to two joints are left out.
+
+    `columns` are regressor columns in order.
     """
     return {(c.link - 1, c.kind): k for k, c in enumerate(columns) if not c.other}
 
@@ -602,7 +604,11 @@ def _configurations(system: System, seed: int, *, symbolic: bool) -> list[Closed
 def _base_parameters_of(
     system: System, method: str, columns: tuple[Column, ...], grouping: Grouping, check: Check
 ) -> BaseParameters:
-    """Return the `BaseParameters` of a grouping, with matrix, expressions and CasADi function."""
+    """Return the `BaseParameters` of a grouping, with matrix, expressions and CasADi function.
+
+    `columns` are all parameters, `grouping` and `check` are results of `method`, a name such as
+    "symbolic".
+    """
     kept = grouping.kept
     K = casadi.vertcat(SX(0, 1), *(SX.sym(column.name) for column in columns))
     values = {k: K[k] for k in kept}
@@ -645,6 +651,8 @@ def _priority_indices(system: System, columns: Sequence[Column], order: Sequence
     """Return the column indices of the parameters named in `order`, which are kept with priority.
 
     Raises ModelError for an unknown name.
+
+    `columns` are all parameters.
     """
     names = [column.name for column in columns]
     for name in order:

@@ -165,7 +165,7 @@ def _misfit_remark(residuals: Residuals) -> list[str]:
 
 
 def _dropped_remark(observations: Observations) -> list[str]:
-    """Return a remark on the instants near singular configurations that were left out, or []."""
+    """Return a remark on instants near singular configurations missing in `observations`, or []."""
     if not observations.dropped:
         return []
     rows = len(observations.time)

@@ -244,7 +244,14 @@ class _PhysicalProblem:
     prior: Prior
 
     def solved(self, watch: Watch | None) -> Array:
-        """Return the parameters (k,) at the minimum."""
+        """Return the parameters (k,) at the minimum, in the order of the columns.
+
+        Args:
+            watch: progress callback, or None.
+
+        Raises:
+            SolverError: IPOPT does not converge.
+        """
         own = [c for c in self.columns if c.kind not in INERTIAL]
         scale = self._scales(own)
         x, z = SX.sym("x", 10, len(self.roots)), SX.sym("z", len(own))
@@ -399,7 +406,7 @@ def _body_pseudo_inertia(body: PseudoInertia) -> SX:
 
 
 def _constant_array(value: Any) -> Array:
-    """Return a constant CasADi expression as a NumPy array."""
+    """Return a constant CasADi expression `value` as a NumPy array of the same shape."""
     return np.asarray(DM(value).full(), dtype=float)
 
 
@@ -569,6 +576,8 @@ def _consistent_estimate(
     """Return the physically consistent estimate for the weights (m,) of the efforts.
 
     Raises ModelError if a joint parameter is not observable.
+
+    `prior` is the guess with mass bounds, `watch` the progress callback.
     """
     unseen = set(excitation_quality(observations).unseen)
     hidden = [c.name for c in observations.columns if c.kind not in INERTIAL and c.name in unseen]

@@ -17,12 +17,18 @@ def entries() -> tuple[Entry, ...]:
 
 
 def _base_function(system: System, method: str, moving_base: bool) -> Function:
-    """Return the Function ``base_parameters(K) -> K_base``; see `base_parameters`."""
+    """Return the Function ``base_parameters(K) -> K_base``; see `base_parameters`.
+
+    The arguments are those of `base_parameters`.
+    """
     return base_parameters(system, method, moving_base=moving_base).function
 
 
 def _base_text(system: System, method: str, moving_base: bool) -> str:
-    """Return the base parameters as text for the menu entry; see `base_parameters`."""
+    """Return the base parameters as text for the menu entry; see `base_parameters`.
+
+    The arguments are those of `base_parameters`.
+    """
     return base_parameters(system, method, moving_base=moving_base).text() + "\n"
 
 

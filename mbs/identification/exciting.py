@@ -450,7 +450,7 @@ def _product(A: Array, x: MX) -> MX:
 
 
 def _spans(ends: Array) -> Array:
-    """Return the widths (rows,) of ranges; 1 for ranges that are open on one side."""
+    """Return widths (rows,) of ranges `ends` (rows, 2); 1 for ranges that are open on one side."""
     span = ends[:, 1] - ends[:, 0]
     return np.where(np.isfinite(span), span, 1.0)
 
@@ -638,6 +638,8 @@ def _limited_motion(
 
     Limits that `measured` (variables -> Trajectory) finds exceeded are tightened and the
     optimisation is repeated. Raises SolverError if this does not succeed.
+
+    `rounds` is the maximum number of iterations, `watch` the progress callback.
     """
     narrowed = np.zeros(len(programme.limits.of_models))
     fixed = len(programme.limits.of_rates)
@@ -663,6 +665,8 @@ def _measured_trajectory(
     """Return the motion of the variables x with its condition numbers and margins.
 
     They are evaluated at instants eight times as dense as the samples, without smoothed friction.
+
+    `programme` maps x to the motion; `columns` are the parameters to identify.
     """
     motion, limits = programme.series(x), programme.limits
     exact = instant(system, columns, limits)
@@ -705,7 +709,7 @@ def _settings(series: FourierSettings | None) -> FourierSettings:
 def _columns(
     system: System, columns: BaseParameters | Sequence[Column] | None
 ) -> tuple[Column, ...]:
-    """Return the parameters to identify; the base parameters for None.
+    """Return the parameters to identify: `columns`, or the base parameters of the system for None.
 
     Raises ModelError for an empty selection or an element that is no Column.
     """
@@ -721,7 +725,8 @@ def _columns(
 def _with_smooth_friction(system: System, limits: MotionLimits, form: FourierSettings) -> System:
     """Return a copy of the system in which Coulomb friction changes its sign continuously.
 
-    The width of the transition is a fraction of the largest velocity of each joint.
+    The width of the transition is a fraction of the largest velocity of each joint, from `limits`
+    or, without a limit, from the position range and the period in `form`.
     """
     widths = {}
     rows = zip(system.active, limits.position, limits.velocity, strict=True)

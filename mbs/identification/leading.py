@@ -95,7 +95,7 @@ def regular(system: System, q: Array) -> npt.NDArray[np.bool_]:
 
 
 def _usual_sign(system: System) -> float:
-    """Return the sign of det(J_p) at the assembled configuration, J_p as in `leads_of`."""
+    """Return the sign of det(J_p) at the assembled configuration: 1.0 or -1.0, see `leads_of`."""
     rows = np.asarray(
         _passive_closure_columns(system)(DM(system.configuration), DM(system.parameter_values()))
     )
@@ -104,7 +104,10 @@ def _usual_sign(system: System) -> float:
 
 
 def _passive_closure_columns(system: System) -> Function:
-    """Return (q, p) -> (r r, 1): passive columns (r, r) of the closure Jacobian, as one column."""
+    """Return the Function (q, p) -> (r r, 1): columns of the r passive joints in the Jacobian.
+
+    The Jacobian is that of r independent closure rows; the result is its column-major vector.
+    """
 
     def build() -> Function:
         q = SX.sym("q", system.nq)
@@ -211,6 +214,9 @@ def is_explicit(system: System) -> bool:
     """Whether the positions of all joints follow from the independent joints without iteration.
 
     True for open systems.
+
+    Args:
+        system: open or closed system.
     """
     if not system.is_closed:
         return True

@@ -78,7 +78,7 @@ class Setting:
 
 
 def _instrumental_estimator(setting: Setting) -> Estimator:
-    """Return the instrumental-variable estimator, with instruments from a simulated motion."""
+    """Return instrumental-variable estimator; the robot is simulated with the data in `setting`."""
 
     def estimator(observations: Observations) -> Estimate:
         values = setting.moving(observations)
@@ -92,7 +92,10 @@ def _instrumental_estimator(setting: Setting) -> Estimator:
 
 
 def _bodies_estimator(setting: Setting) -> Estimator:
-    """Return the estimator that computes base parameters from physically consistent bodies."""
+    """Return the estimator of base parameters from physically consistent bodies.
+
+    `setting` contains the data of the record and the guess of the bodies.
+    """
 
     def estimator(observations: Observations) -> Estimate:
         bodies = setting.bodies_of(observations)
@@ -208,7 +211,7 @@ def essential(
 
 
 def _degrees_of_freedom(estimate: Estimate) -> float:
-    """Return the degrees of freedom: independent equations minus parameters, at least one."""
+    """Return the degrees of freedom: independent equations minus parameters, at least 1."""
     error = estimate.residuals.error
     return max(float(np.sum(len(error) / repetition(error))) - len(estimate.values), 1.0)
 

@@ -345,7 +345,7 @@ class Observations:
         return self._rows_of(np.isin(self.time, time))
 
     def _rows_of(self, keep: npt.NDArray[np.bool_]) -> Observations:
-        """Return the observations of the instants of a mask (n,) only."""
+        """Return the observations of the instants at which the mask `keep` (n,) is True."""
         return replace(self, time=self.time[keep], W=self.W[keep], y=self.y[keep])
 
 
@@ -370,7 +370,10 @@ def observe(regressor: Any, samples: Samples) -> Observations:
 
 
 def _observe(regressor: Any, samples: Samples) -> Observations:
-    """Return the equations of every sample, interpolated close to singular configurations."""
+    """Return the equations of every sample, interpolated close to singular configurations.
+
+    `regressor` is a model of `regressors.py`, evaluated at every sample.
+    """
     return Observations(
         samples.time,
         evaluated(regressor, samples)[0],

@@ -540,7 +540,7 @@ class Record:
         return found
 
     def _selected(self, keep: npt.NDArray[np.bool_]) -> Record:
-        """Return the record with the rows of a mask (n,) only."""
+        """Return the record with the rows at which the mask `keep` (n,) is True."""
         v = None if self.v is None else self.v[keep]
         return replace(self, time=self.time[keep], q=self.q[keep], tau=self.tau[keep], v=v)
 
@@ -855,6 +855,8 @@ def _trim(even: Record, q: Array, v: Array, bandwidth: float, order: int) -> Sam
 
     Accelerations are differences of v, efforts pass the same filter, the ends with filter
     transients are dropped and the rows are decimated. Raises ModelError if too few rows remain.
+
+    `bandwidth` [Hz] and `order` are those of the filter.
     """
     rate = _rate(even.time)
     a = central_difference(v, rate)

@@ -373,7 +373,7 @@ def numeric_parameters(
 
 
 def _joint_value(link: Link, kind: str) -> SX:
-    """Return the value of a joint parameter: "Ia", "Jm", "Fv" or "Fs"; 0 for other kinds."""
+    """Return value of the joint parameter `kind` of a link: "Ia", "Jm", "Fv" or "Fs"; else 0."""
     if kind == "Jm":
         return link.rotor.inertia if link.rotor is not None else SX(0)
     known = {"Ia": link.Ia, "Fv": link.Fv, "Fs": link.Fs}
@@ -505,6 +505,9 @@ class JointColumns:
         """Return the generalised momentum (nv, 1) per unit of a parameter.
 
         It is the derivative of the kinetic energy in the joint velocities.
+
+        Args:
+            column: parameter.
         """
         if column.kind not in _INERTIAS:
             return zeros(self.tree.nv)
@@ -522,6 +525,9 @@ class JointColumns:
         """Return the efforts that are not the rate of `momentum` (nv, 1), per unit of a parameter.
 
         These are the joint efforts minus the time derivative of the generalised momentum.
+
+        Args:
+            column: parameter.
         """
         if column.kind != "Jm":
             return self._own_effort(column, self.v, zeros(self.tree.nv))
@@ -532,13 +538,21 @@ class JointColumns:
         return -self._moment_efforts(rates[rotor.carrier], rotor.momentum * self.v[link.v])
 
     def energy(self, column: Column) -> SX:
-        """Return the kinetic energy per unit of a parameter; zero for friction and offsets."""
+        """Return the kinetic energy per unit of a parameter; zero for friction and offsets.
+
+        Args:
+            column: parameter.
+        """
         if column.kind not in _INERTIAS:
             return SX(0)
         return SX(0.5 * casadi.dot(self.v, self.momentum(column)))
 
     def power(self, column: Column) -> SX:
-        """Return the power that friction or an offset absorbs per unit of it; zero for inertias."""
+        """Return the power that friction or an offset absorbs per unit of it; zero for inertias.
+
+        Args:
+            column: parameter.
+        """
         if column.kind in _INERTIAS:
             return SX(0)
         return SX(casadi.dot(self.v, self.rest(column)))
@@ -598,7 +612,10 @@ class JointColumns:
 
 
 def _joint_law(link: Link, v: SX, a: SX) -> SX:
-    """Return the efforts of rotor inertia and friction of a joint at its velocity v and rate a."""
+    """Return the efforts (nv, 1) of rotor inertia and friction of the joint of a link.
+
+    `v` and `a` are the velocities and accelerations of this joint.
+    """
     alone = replace(link, v=slice(0, link.motion.nv))
     return rotor_and_friction(Tree((alone,), zeros()), v, a)
 
@@ -943,6 +960,8 @@ def _base_motion(system: System, moves: bool) -> tuple[Tree, Velocity | None, Na
     """Return the tree, the base velocity and the named inputs v_0 and R_0 of a moving base.
 
     Gravity of the tree is then in base axes. Without a moving base: None and no inputs.
+
+    `moves` is whether the base moves.
     """
     if not moves:
         return system.tree, None, []
@@ -952,6 +971,9 @@ def _base_motion(system: System, moves: bool) -> tuple[Tree, Velocity | None, Na
 
 
 def _matrix_rate(system: System, s: ModelSymbols, G: SX) -> SX:
-    """Return the time derivative of a matrix G that depends on the positions only."""
+    """Return the time derivative of a matrix G that depends on positions only, same shape as G.
+
+    `s` are the symbols of positions and velocities of the model.
+    """
     qdot = position_rate(system.tree, s.q, s.v_tree)
     return casadi.reshape(casadi.jtimes(casadi.vec(G), s.q, qdot), *G.shape)

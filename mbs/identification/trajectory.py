@@ -446,7 +446,7 @@ def _check_names(system: System, what: str, given: Mapping[str, Any], known: Seq
 def _join(
     names: Sequence[str], units: Sequence[str], pairs: Sequence[tuple[float, float]]
 ) -> list[tuple[str, str, float, float]]:
-    """Return the tuples (name, unit, lower, upper) of quantities."""
+    """Return tuples (name, unit, lower, upper) of quantities, from `pairs` (lower, upper)."""
     rows = zip(names, units, pairs, strict=True)
     return [(name, unit, lower, upper) for name, unit, (lower, upper) in rows]
 

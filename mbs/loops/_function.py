@@ -69,7 +69,7 @@ def fixed_positions(system: System, values: Given) -> dict[str, float]:
 
 
 def _numbers(values: Any) -> list[float] | None:
-    """Return the elements of a sequence as floats; None if an element is no number."""
+    """Return the elements of the sequence `values` as floats; None if an element is no number."""
     try:
         return None if has_boolean(values) else [float(x) for x in values]
     except (TypeError, ValueError):
@@ -196,6 +196,8 @@ def _edge(is_reached: Callable[[float], bool], low: float, high: float) -> float
     """Return the limit of reachability between two positions, one reachable and one not.
 
     `is_reached` returns whether the loops close at a position.
+
+    One of the positions `low` and `high` is reachable. The interval is halved repeatedly.
     """
     first = is_reached(low)
     for _ in range(_HALVINGS):
@@ -332,6 +334,8 @@ def _ways(system: System, stages: Sequence[Stage], branch: Branch) -> tuple[int,
     """Return the branch index of each stage; loops without a label keep their assembled branch.
 
     Raises ModelError for an unknown label.
+
+    `stages` are the solution steps of the loops; `branch` is the label of a branch.
     """
     labels = _labels(system, branch)
     known = [label for stage in stages for label in stage.labels if label]

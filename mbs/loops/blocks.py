@@ -356,7 +356,10 @@ class _GearTrain:
 
 
 def _coaxial_row(ring: Ring, q: SX) -> SX:
-    """Return the closure error of a loop of coaxial revolute joints: angle [rad] as expression."""
+    """Return the closure error of a loop of coaxial revolute joints: angle [rad] as expression.
+
+    q is the vector of all positions.
+    """
     angle, turned, sense = SX(0), SX.eye(3), SX(1)
     for joint, gap in zip(ring.joints, [*ring.gaps[1:], ring.gaps[0]], strict=True):
         angle += sense * joint.sign * q[_index(joint)]
@@ -414,7 +417,10 @@ def _some(numbers: list[int], links: dict[int, set[int]]) -> Iterator[list[int]]
 
 
 def _is_flat_kind(work: PlanWork, number: int) -> bool:
-    """Whether a loop can be plane: unknown joints revolute or prismatic, closed by no rod."""
+    """Whether a loop can be plane: unknown joints revolute or prismatic, closed by no rod.
+
+    `number` is the index of the cut joint of the loop.
+    """
     if is_bound(work.system, number) or isinstance(work.system.cuts[number].edge.joint, Rod):
         return False
     links = work.system.tree.links

@@ -168,5 +168,5 @@ class GuessTarget:
 
 
 def _largest(values: Vector) -> float:
-    """Return the largest absolute value; 0 for an empty array."""
+    """Return the largest absolute element of `values`; 0 for an empty array."""
     return float(np.max(np.abs(values), initial=0.0))

@@ -388,9 +388,9 @@ def _distance(system: System, q: Vector, other: Vector) -> float:
 
 
 def _tidy(target: Goal, q: Vector) -> Vector:
-    """Return q with angles within half a rotation of zero and positive quaternions.
+    """Return q (nq,) with angles in [-pi, pi] and quaternions with nonnegative first elements.
 
-    If that does not close the loops, as with gears, q is returned unchanged.
+    q is unchanged if the changed positions do not close the loops of `target`.
     """
     system = target.closing.system
     tidy = within_half_turn(system, q)
@@ -479,9 +479,9 @@ def _moved(closing: Closing, start: Vector, rng: np.random.Generator) -> Vector:
 
 
 def _tidy_start(closing: Closing, q: Vector) -> Vector:
-    """Return q with its free angles within half a rotation of zero.
+    """Return the positions q (nq,) with the free angles in [-pi, pi].
 
-    If that does not close the loops, as with gears, q is returned unchanged.
+    q is unchanged if the changed positions do not close the loops.
     """
     tidy = within_half_turn(closing.system, q)
     tidy[list(closing.locked)] = q[list(closing.locked)]

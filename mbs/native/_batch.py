@@ -394,7 +394,11 @@ class Batch:
         return [values[name] for name in names]
 
     def _states(self, given: Sequence[Array]) -> int | None:
-        """Return the number of states; None if all inputs are single states."""
+        """Return the number of states; None if all inputs are single states.
+
+        `given` are the arrays of the inputs. Raises ModelError if they have different numbers of
+        states.
+        """
         rows = [
             (port.name, len(array))
             for port, array in zip(self.inputs, given, strict=True)
@@ -427,6 +431,8 @@ class Batch:
         """Raise ModelError if an output array shares memory with another array.
 
         An output may be exactly the array of an input.
+
+        `given` are the arrays of the inputs, `results` those of the outputs.
         """
         for port, result in zip(self.outputs, results, strict=True):
             others = [array for array in results if array is not result]
@@ -562,7 +568,7 @@ def _code(function: Function, finite: bool, valid: int) -> tuple[_Code | None, s
 
 
 def _defaults(functions: Sequence[Function]) -> dict[str, Array]:
-    """Return the default parameter values `p` of a model; empty if they may not be omitted."""
+    """Return {"p": default parameters (np,)} of the first of the models that has them, else {}."""
     for function in functions:
         model = function if hasattr(function, "default_of_p") else None
         value = None if model is None else default_of_last(function, model)

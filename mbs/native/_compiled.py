@@ -132,6 +132,8 @@ def _looped_library(function: casadi.Function, derivatives: int, code: LoopCode)
 
     Derivatives without a loop version are straight-line code that is compiled at its first use.
     None if the cache is not writable.
+
+    `code` generates the C code; `derivatives` is the highest order of the derivatives.
     """
     name = function.name()
     every = derivatives_of(name, derivatives) if derivatives else []
@@ -161,6 +163,8 @@ def _built(function: casadi.Function, derivatives: int, fast: bool) -> Path | No
     """Return the library of a Function with all its derivatives, which are compiled immediately.
 
     None if C cannot express them.
+
+    `derivatives` is the highest order, 0 to 2; `fast` permits changes of rounding.
     """
     every = [function, *_all_derivatives(function, derivatives)]
     known = _products(function) if derivatives == 2 else []
@@ -488,5 +492,5 @@ def _all_derivatives(function: casadi.Function, order: int) -> list[casadi.Funct
 
 
 def _products(function: casadi.Function) -> list[casadi.Function]:
-    """Return the directional derivatives of a Function: forward and reverse products."""
+    """Return the directional derivatives of a Function, [forward(1), reverse(1)] of CasADi."""
     return [function.forward(1), function.reverse(1)]

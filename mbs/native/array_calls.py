@@ -90,9 +90,9 @@ def _shape(pattern: Sparsity) -> tuple[Any, ...]:
 
 
 def _arguments_of_empty(pattern: Sparsity) -> tuple[Any, ...]:
-    """Return the arguments of numpy.empty for a result: shape, type and order.
+    """Return arguments of numpy.empty for a result with a sparsity `pattern`: shape, type, order.
 
-    The shape is a vector for one column, else a matrix in Fortran order.
+    The shape is (n,) for one column, else (rows, columns) in Fortran order.
     """
     rows, columns = pattern.shape
     return ((rows,) if columns == 1 else (rows, columns)), np.float64, "F"
@@ -139,6 +139,8 @@ def _guarded(
     """Return a callable for a model with an input check.
 
     `valid` is the Function of the check; `code_of` compiles it at the first call.
+
+    `result` is the callable object of the model, `function` its Function and `library` its library.
     """
 
     def first(*args: Any) -> Any:
@@ -203,7 +205,10 @@ class ArrayCalls:
         return self._arrays(*args, *(out if isinstance(out, tuple) else (out,)))
 
     def _slow(self, args: tuple[Any, ...], kwargs: dict[str, Any], out: Any) -> Any:
-        """Return result by CasADi, for symbols, several columns and arguments that raise errors."""
+        """Return the result for `args` and `kwargs` by CasADi; it is also written to `out`.
+
+        It serves symbols, several columns and arguments that raise errors.
+        """
         if any(_holds(x, np.ma.MaskedArray) for x in args):
             raise ModelError(
                 f"{self.name()}: an input has a mask, which would be passed over; give"  # type: ignore[attr-defined]

@@ -421,9 +421,11 @@ def slots(
 
 
 def _input_places(graph: Graph, calls: Sequence[Calls]) -> tuple[dict[int, int], int]:
-    """Return the offset in the work array of each input that recurring sequences read.
+    """Return the offset in the work array of each input of `graph` that recurring sequences read.
 
     The second result is the total length of these inputs.
+
+    `calls` are the calls of the sequences.
     """
     repeats = {step.repeat for step in calls}
     taken = {n for repeat in repeats for column in repeat.taken for n in column.nodes}
@@ -546,7 +548,10 @@ class BlockCode:
         return [self._repeat(*item) for item in self.where.tables.items()]
 
     def _repeat(self, repeat: Repeat, table: CallTable) -> str:
-        """Return C function of a recurring sequence, and its tables of indices and constants."""
+        """Return C function of a recurring sequence, with its tables of work indices and constants.
+
+        `repeat` is the sequence, `table` the work indices that each occurrence uses.
+        """
         index, name = _index(self.where.count), self._repeat_name(repeat)
         columns = (taken.nodes for taken in repeat.constants)
         constants = (map(self.number, row) for row in zip(*columns, strict=True))
@@ -585,7 +590,7 @@ class BlockCode:
         return "".join(f"; {verb} {in_c_comment(names)}" for verb, names in words.items() if names)
 
     def _calls(self, step: Calls) -> str:
-        """Return the C line that calls consecutive occurrences of a sequence, in a loop."""
+        """Return C line of a `step` that calls consecutive occurrences of a sequence, in a loop."""
         name, table = self._repeat_name(step.repeat), self.where.tables[step.repeat]
         loop = f"for (int k = {step.first}; k < {step.first + step.count}; ++k) "
         index = "k" if step.count > 1 else str(step.first)
@@ -692,7 +697,10 @@ class BlockCode:
         ]
 
     def _stores(self, leaving: Sequence[Leaving]) -> list[str]:
-        """Return C lines that store output elements. Runs of zeros are stored by memset."""
+        """Return C lines that store the elements `leaving`, as (output, element, node).
+
+        Runs of zeros are stored by memset.
+        """
         rows = [(k, element, self.stored(node)) for k, element, node in leaving]
         lines: list[str] = []
         for (k, text), elements in groupby(rows, lambda row: (row[0], row[2])):
@@ -708,7 +716,7 @@ class BlockCode:
 
 
 def _index(largest: int) -> str:
-    """Return the C type of an index table; unsigned short halves its size."""
+    """Return C type of an index table: "unsigned short" if `largest` is below 2^16, else "int"."""
     return "unsigned short" if largest < 1 << 16 else "int"
 
 
@@ -775,7 +783,11 @@ class FloatCode(BlockCode):
     zero: ClassVar[str] = "0.0f"
 
     def stored(self, number: int) -> str:
-        """Return the C text of a node that is stored to an output; see `BlockCode.stored`."""
+        """Return the C text of a node that is stored to an output; see `BlockCode.stored`.
+
+        Args:
+            number: index of the node.
+        """
         return _float_operand(self.graph, number)
 
     def number(self, number: int) -> str:
@@ -814,17 +826,30 @@ class LaneCode(BlockCode):
     kind: ClassVar[str] = "mbs_lanes"
 
     def of(self, graph: Graph, where: Slots) -> Self:
-        """Return the writer of the graph of a recurring sequence; see `BlockCode.of`."""
+        """Return the writer of the graph of a recurring sequence; see `BlockCode.of`.
+
+        Args:
+            graph: graph of the sequence.
+            where: places of its nodes in the work array.
+        """
         return replace(self, graph=graph, where=where, shared=[True])
 
     def input(self, number: int) -> str:
-        """Return the C declaration of the pointer to an input; see `BlockCode.input`."""
+        """Return the C declaration of the pointer to an input; see `BlockCode.input`.
+
+        Args:
+            number: index of the input.
+        """
         if self.shared[number]:
             return f"const double *restrict i{number} = in[{number}]"
         return f"const mbs_lanes *restrict i{number} = (const mbs_lanes *)in[{number}]"
 
     def stored(self, number: int) -> str:
-        """Return the C text of a node that is stored to an output; see `BlockCode.stored`."""
+        """Return the C text of a node that is stored to an output; see `BlockCode.stored`.
+
+        Args:
+            number: index of the node.
+        """
         return self._vector(number)
 
     def values(self, step: Step) -> list[str]:

@@ -277,7 +277,7 @@ def _compile(compiler: Compiler, arguments: Sequence[str], sources: Sequence[Pat
 
 
 def _main_error(stderr: str) -> str:
-    """Return the most informative line of the error output of a compiler or linker."""
+    """Return the most informative line of `stderr`, the error output of a compiler or linker."""
     lines = stderr.splitlines()
     found = (s for word in ("undefined reference", "error") for s in lines if word in s)
     return next(found, stderr)
@@ -453,7 +453,10 @@ def _library_in(
     common: Collection[str],
     together: Collection[str],
 ) -> Path:
-    """Return the library of `cached_library` in a cache folder; compile it if it is missing."""
+    """Return the library of `cached_library` in a cache folder; compile it if it is missing.
+
+    The other arguments are those of `cached_library`.
+    """
     key = _key(files, flags, compiler)
     known = _undamaged_file(folder, key, suffix)
     if known is not None:
@@ -525,13 +528,16 @@ def _checked(library: Path, changed: int, size: int) -> bool:
 
 
 def _checksum(library: Path) -> str:
-    """Return the first 16 digits of the SHA-256 hash of a file."""
+    """Return the first 16 hexadecimal digits of the SHA-256 hash of the file `library`."""
     with library.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()[:16]
 
 
 def _key(files: Mapping[str, str], flags: Sequence[str], compiler: Compiler) -> str:
-    """Return the cache key: a hash of everything that affects the code of a library."""
+    """Return the cache key of a library: a hash of `files` (name to text), `flags` and `compiler`.
+
+    It includes the versions of CasADi and of the compiler, and the type of machine.
+    """
     digest = hashlib.sha256()
     facts = (casadi.CasadiMeta.version(), platform.machine(), *compiler.command, compiler.version)
     texts = (text for name in sorted(files) for text in (name, files[name]))

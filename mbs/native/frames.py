@@ -284,7 +284,10 @@ def _table(name: str, pattern: Sparsity) -> str:
 
 
 def _work(name: str, n_in: int, n_out: int, work: int | str) -> str:
-    """Return the C function NAME_work, which reports the lengths of the work arrays."""
+    """Return the C function NAME_work, which reports the lengths of the work arrays.
+
+    `n_in` and `n_out` are the numbers of inputs and outputs, `work` is the number of doubles.
+    """
     sizes = {"arg": n_in, "res": n_out, "iw": 0, "w": work}
     pointers = ", ".join(f"casadi_int *{kind}" for kind in sizes)
     sets = " ".join(f"if ({kind}) *{kind} = {size};" for kind, size in sizes.items())

@@ -180,7 +180,10 @@ def _tables(mapped: Mapped, columns: Columns, buffers: Sequence[tuple[int, int]]
 
 
 def _inputs(graph: Graph, mapped: Mapped) -> list[str]:
-    """Return the C expressions of the pointers to the inputs of a map at the current columns."""
+    """Return C expressions of the pointers to the inputs of a map, at the columns that start at c.
+
+    `graph` is the graph of one column, `mapped` the map.
+    """
     result = []
     for k, port in enumerate(graph.inputs):
         text = f"out[{mapped.inputs[k]}]"
@@ -235,7 +238,7 @@ def kernel_source(functions: Iterable[Function], block: int = BLOCK) -> dict[str
 
 
 def _file(function: Function, block: int) -> str:
-    """Return the text of the C file of a Function."""
+    """Return text of the C file of a Function, with at most `block` assignments per C function."""
     stages = staged(function) or StagedFunction(function, ())
     graph = graph_of(stages.scalar)
     scheduling = _GCC if len(graph.nodes) <= _SHORT else ""
@@ -446,7 +449,7 @@ def _write_entry(entry: Path, name: str) -> None:
 
 
 def _index_key(text: str, options: str) -> str:
-    """Return the hash of all that determines the code: compiler, flags, generator, Function."""
+    """Return hash of compiler, flags, generator, processor, `options` and the Function `text`."""
     compiler = find_compiler()
     facts = (casadi.CasadiMeta.version(), *compiler.command, compiler.version, processor())
     digest = hashlib.sha256()

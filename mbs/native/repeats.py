@@ -352,7 +352,11 @@ class _Order:
         return within.repeat(tuple(given), len(places))
 
     def bases(self, repeat: Repeat) -> int:
-        """Return the number of indices per occurrence of a sequence, with results in step order."""
+        """Return the number of indices per occurrence of a sequence, with results in step order.
+
+        Args:
+            repeat: recurring sequence.
+        """
         columns = np.array([t.nodes for t in repeat.taken]).reshape(-1, repeat.count)
         steps = self._place[columns]
         places = np.where(steps < 0, columns - len(self._place), steps)
@@ -391,7 +395,12 @@ class _Sequence:
         return self._once(values, element, self._constants, nodes)
 
     def repeat(self, given: tuple[OccurrenceNodes, ...], count: int) -> Repeat:
-        """Return the completed sequence, with its results `given` and the number of occurrences."""
+        """Return the completed sequence, with its results `given` and the number of occurrences.
+
+        Args:
+            given: nodes of the results.
+            count: number of occurrences.
+        """
         constants = Port("constants", Sparsity.dense(len(self._constants)))
         graph = Graph(self._whole.name, (constants,), (), tuple(self._nodes), ())
         own = tuple(self._constants), tuple(self._taken)

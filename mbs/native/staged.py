@@ -122,6 +122,10 @@ class _Trace:
         """Return the outputs of a Function for symbolic arguments; its maps are recorded.
 
         Raises ModelError for operations that are not supported.
+
+        Args:
+            function: SX or MX Function.
+            arguments: its inputs.
         """
         if function.class_name() in _MAPS:
             return self._map(function, arguments)
@@ -156,7 +160,11 @@ class _Trace:
         ]
 
     def _step(self, op: int, node: MX, arguments: list[_Value]) -> Sequence[_Value]:
-        """Return the results of one instruction of an MX Function, with CasADi operation `op`."""
+        """Return the results of one instruction of an MX Function, with CasADi operation `op`.
+
+        `node` is the CasADi node of the instruction, with its `arguments`. Raises ModelError for
+        operations that are not supported.
+        """
         if op == casadi.OP_CALL:
             return self.called(node.which_function(), arguments)
         if op == casadi.OP_HORZREPMAT:
@@ -175,7 +183,7 @@ class _Trace:
         return [SX(_MOVES[op](node, values))]
 
     def _map(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
-        """Record a map and return its outputs as new symbols."""
+        """Record a map `function` of symbolic `arguments` and return its outputs as new symbols."""
         column, columns = function, 1
         while column.class_name() in _MAPS:
             facts = column.info()
@@ -199,7 +207,7 @@ class _Trace:
 
 
 def _as_matrix(value: _Value) -> SX:
-    """Return a value as a matrix, with repetitions written out."""
+    """Return `value` as a matrix; a repeated matrix is written out."""
     return casadi.repmat(value.value, 1, value.times) if isinstance(value, _Tiled) else value
 
 
@@ -214,7 +222,7 @@ def _input_part(arguments: Sequence[_Value], node: MX) -> _Value:
 
 
 def _elements(value: SX) -> SX:
-    """Return the non-zero elements of a matrix as a vector."""
+    """Return the nonzero elements of a matrix `value` as a vector (nnz, 1), column by column."""
     return SX(value.nz[:]) if value.nnz() else SX(0, 1)
 
 

@@ -324,7 +324,7 @@ def _by_parameters(model: str, inputs: int) -> list[str]:
 
 
 def _parameter(function: Function) -> str:
-    """Return C text of the pointer to the parameters p of a Function; "0" without parameters."""
+    """Return the C text of the pointer to parameters p of a Function, "arg[k]"; "0" without p."""
     names = function.name_in()
     return f"arg[{names.index('p')}]" if "p" in names else "0"
 

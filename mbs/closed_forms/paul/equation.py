@@ -122,7 +122,10 @@ def equations(knowledge: KnownFrames, most: int = PRODUCTS) -> tuple[Equation, .
 
 
 def _fingerprint(equation: Equation) -> object:
-    """Return a hashable value that is equal for equations that are multiples of each other."""
+    """Return a hashable value that is equal for equations that are multiples of each other.
+
+    It consists of the rounded coefficients at all samples, scaled to unit length and one sign.
+    """
     keys = sorted(equation.parts)
     samples = max(len(part.values) for part in equation.parts.values())
     table = np.stack([np.broadcast_to(equation.parts[key].values, samples) for key in keys])
@@ -132,7 +135,11 @@ def _fingerprint(equation: Equation) -> object:
 
 
 def _leading(table: Values) -> NDArray[np.float64]:
-    """Return a number per sample (column) that changes sign with the column and is not small."""
+    """Return for each column of a complex `table` a real number whose sign changes with the column.
+
+    It is the first real or imaginary part of at least 0.3 of the largest, so that rounding does not
+    decide its sign.
+    """
     parts = np.concatenate([table.real, table.imag])
     largest = np.max(np.abs(parts), axis=0)
     # a value near zero must not decide; of values that are equal up to rounding, take the first
@@ -352,6 +359,8 @@ def _combined_term(
     """Return G = X - i Y of a term from all products of cosines and sines of its joints.
 
     `term` is the powers of prismatic joints, and the pairs of joint and sign of revolute joints.
+
+    `row` is the equation, `matrices` and `knowledge` the known transforms and joints.
     """
     prismatic, angles = term
     X, Y = SX(0), SX(0)
@@ -385,7 +394,10 @@ def _coefficient(
 
 
 def _path(row: SplitRow, n: int, direction: int) -> Iterator[tuple[str, int]]:
-    """Yield joints and known transforms between two frames, around the loop in one direction."""
+    """Yield ("joint", k) or ("gap", k) from the start frame to the end frame of an equation `row`.
+
+    The loop has n joints and is traversed forwards (`direction` 1) or backwards (-1).
+    """
     point = row.start
     while point != row.end:
         at = point if direction > 0 else (point - 1) % (2 * n)

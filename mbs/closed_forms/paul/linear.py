@@ -211,7 +211,7 @@ def _equation_text(
 
 
 def _letters(count: int) -> list[str]:
-    """Return letters a, b, ... that distinguish the coefficients of several equations.
+    """Return `count` letters a, b, ... that distinguish the coefficients of several equations.
 
     A single equation has an empty letter.
     """

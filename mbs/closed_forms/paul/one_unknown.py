@@ -45,7 +45,12 @@ class PaulStage:
     equations: tuple[Equation, ...]
 
     def factor(self, equation: Equation, key: Key) -> Factor:
-        """Return the coefficient of the monomial with exponents `key`, as an expression."""
+        """Return the coefficient of the monomial with exponents `key`, as an expression.
+
+        Args:
+            equation: equation of this stage.
+            key: exponents of the product, one for each variable of the equation.
+        """
         return factor(self.knowledge, self.matrices, equation, key)
 
     def number(self, variable: Variable) -> str:

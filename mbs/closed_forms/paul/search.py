@@ -32,6 +32,8 @@ def sums(stage: PaulStage) -> Iterator[Candidate]:
 
     Args:
         stage: known quantities and equations.
+
+    A step is an explicit formula for one or more unknown joint positions.
     """
     for rest, value, text in _isolated_angles(stage):
 
@@ -44,7 +46,10 @@ def sums(stage: PaulStage) -> Iterator[Candidate]:
 
 
 def _isolated_angles(stage: PaulStage) -> Iterator[tuple[Variable, SX, str]]:
-    """Yield each single angle that known sums determine, its value, and the equation."""
+    """Yield each single angle that known sums determine, its value, and the equation.
+
+    `stage` contains the known sums of angles. The equation is text, such as "q2+q3 = x6".
+    """
     knowledge = stage.knowledge
     opened = [
         (rest, value, f"{stage.term(whole)} = {knowledge.problem.x[index]}")
@@ -83,7 +88,7 @@ def _combined_signs(first: Variable, second: Variable, sense: int) -> dict[int, 
 
 
 def _has_unit_coefficients(total: dict[int, int]) -> bool:
-    """Whether all coefficients of a sum of angles, by joint, are -1, 0 or 1."""
+    """Whether all values of `total`, coefficients by joint index, are -1, 0 or 1."""
     return all(abs(sign) <= 1 for sign in total.values())
 
 
@@ -115,6 +120,8 @@ def _with_moved_frame(problem: Problem, ring: Ring, k: int) -> Ring:
     """Return the loop with the origin of joint k at the foot of the normal to the next axis.
 
     The same object is returned if the axes are parallel or the origin is there already.
+
+    `problem` gives the samples at which the axes of `ring` are compared.
     """
     pose = ring.gaps[k + 1].pose
     axis, cosine = pose.R[:, 2], pose.R[2, 2]
@@ -177,6 +184,8 @@ def _cheapest(stage: PaulStage) -> tuple[SequenceStep, tuple[Variable, ...]] | N
     """Return the step with the fewest operations among the candidates of the lowest rank.
 
     The second result is the variables that it solves. None if there is no candidate.
+
+    `stage` contains the known quantities and the equations.
     """
     for kernels in _KERNELS:
         every = [
@@ -204,7 +213,10 @@ def _require_simple(problem: Problem) -> None:
 
 
 def _refusal(stage: PaulStage, steps: Sequence[SequenceStep]) -> str:
-    """Return an error message with the unsolved joints and the equations that contain them."""
+    """Return an error message with the unsolved joints and the equations that contain them.
+
+    `stage` is the last stage of the search, `steps` the steps that were found.
+    """
     knowledge = stage.knowledge
     left = ", ".join(knowledge.ring.joints[k].name for k in knowledge.unknown)
     given = ", ".join(name for step in steps for name in step.names)

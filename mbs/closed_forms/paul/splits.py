@@ -421,7 +421,10 @@ def simple_rows(
 
 
 def _counts(table: _Table, mask: NDArray[np.bool_]) -> NDArray[np.int_]:
-    """Return the numbers (3, rows) of variables (at least), joints and products in masked rows."""
+    """Return three counts (3, rows) of the terms that a mask (rows, terms) selects from a table.
+
+    They are a lower bound of the number of variables, and the numbers of joints and of products.
+    """
     weights = mask.astype(int)
     joints = (weights @ table.has) > 0
     together = np.zeros(joints.shape, dtype=bool)

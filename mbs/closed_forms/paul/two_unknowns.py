@@ -111,7 +111,10 @@ def _fits(row: Equation, stays: int) -> bool:
 
 
 def _candidate(stage: PaulStage, rows: tuple[Equation, Equation], stays: int) -> Candidate | None:
-    """Return the step of two equations with variable `stays` (0 or 1); None if it is impossible."""
+    """Return the step of two equations with variable `stays` (0 or 1); None if it is impossible.
+
+    `rows` are the two equations; the other variable is eliminated.
+    """
     forms = [_form_of_values(row, stays) for row in rows]
     power = _common_power(forms)
     if power is None:
@@ -151,13 +154,13 @@ def _common_power(forms: Sequence[_Form]) -> int | None:
 
 
 def _spread(G: list[Complex]) -> list[Complex]:
-    """Return the pairs of real and imaginary arrays, broadcast to one shape."""
+    """Return the pairs (real, imaginary) of arrays in G, broadcast to one shape."""
     arrays = np.broadcast_arrays(*(part for pair in G for part in pair))
     return [(arrays[2 * k], arrays[2 * k + 1]) for k in range(len(G))]
 
 
 def _form_of_values(row: Equation, stays: int) -> _Form:
-    """Return the form of an equation with numeric coefficients."""
+    """Return form of an equation `row` with numeric coefficients; the variable `stays` remains."""
 
     def part(key: Key) -> Complex:
         values = row.at(key)
@@ -193,6 +196,9 @@ def _resultant(forms: Sequence[_Form], power: int, prismatic: bool) -> Numbers:
     """Return the coefficients of the equation in y alone: of 1, y .. y^4, or 1, c, s, c2, s2.
 
     `power` is the index of the factor by which the other unknown is eliminated.
+
+    `forms` are the two equations, `prismatic` whether y is a length; c and s are cosine and sine of
+    y, c2 and s2 of 2 y.
     """
     (x, y), (u, v) = forms[0].G[power], forms[1].G[power]
     n, a, b = x * x + y * y, u * x + v * y, v * x - u * y

@@ -118,7 +118,10 @@ def dialytic(elimination: Elimination, E: SX) -> SX:
 
 
 def _pivot(values: Array) -> tuple[int, int]:
-    """Return (row, column) of the entry whose smallest magnitude over the samples is largest."""
+    """Return (row, column) of the entry whose minimum magnitude over the samples is largest.
+
+    `values` are the matrices (samples, rows, columns).
+    """
     smallest = np.min(np.abs(values), axis=0)
     r, c = np.unravel_index(first_best(smallest.ravel()), smallest.shape)
     return int(r), int(c)
@@ -133,14 +136,20 @@ def _without_vanishing(row: SX, values: Array) -> SX:
 
 
 def _right_side(elimination: Elimination, ways: Sequence[Pose]) -> SX:
-    """Return the side of the loop equation with joints 1 and 2, (s, n1 n2), by their monomials."""
+    """Return the side of the loop equation with joints 1 and 2, (s, n1 n2), by their monomials.
+
+    `ways` are the six transforms of the loop; `way` k follows joint k.
+    """
     u = _origin_axis_products(ways[5].inverse())[elimination.elements.tolist()]
     once = _carry(elimination, ways[0].inverse(), _products_with_parts(elimination.first, u))
     return _carry(elimination, ways[1].inverse(), _products_with_parts(elimination.second, once))
 
 
 def _left_side(elimination: Elimination, ways: Sequence[Pose]) -> list[SX]:
-    """Return the side of the loop equation with joints 3, 4 and 5, for each part of joint 3."""
+    """Return the side of the loop equation with joints 3, 4 and 5, for each part of joint 3.
+
+    `ways` are the six transforms of the loop. The columns are the monomials of joints 4 and 5.
+    """
     w = _origin_axis_products(ways[4])[elimination.elements.tolist()]
     once = _carry(elimination, ways[3], _products_with_parts(elimination.fifth, w))
     twice = _carry(elimination, ways[2], _products_with_parts(elimination.fourth, once))
@@ -148,12 +157,12 @@ def _left_side(elimination: Elimination, ways: Sequence[Pose]) -> list[SX]:
 
 
 def _products_with_parts(parts: Array, columns: SX) -> SX:
-    """Return the products of the columns with each part, side by side."""
+    """Return the products part @ columns of all `parts` (k, s, s), side by side (s, k columns)."""
     return SX(casadi.horzcat(*(casadi.mtimes(_constant(part), columns) for part in parts)))
 
 
 def _carry(elimination: Elimination, T: Pose, columns: SX) -> SX:
-    """Return the used elements of columns of w after the symbolic transform T."""
+    """Return `columns` (s, n) of w after the transform T, for the s used elements of w."""
     own = elimination.elements.tolist()
     X = SX(SIZE, SIZE)
     for t, slope in zip(casadi.vertsplit(T.p), SLOPES, strict=True):
@@ -171,7 +180,7 @@ def _origin_axis_products(T: Pose) -> SX:
 
 
 def _constant(part: NDArray[np.float64]) -> SX:
-    """Return a numeric matrix as a sparse expression."""
+    """Return a numeric matrix `part` as a sparse expression of the same shape."""
     return SX(casadi.sparsify(DM(part)))
 
 
@@ -201,7 +210,11 @@ class Characteristic:
     regularity: float
 
     def matrix(self, q: SX) -> SX:
-        """Return the matrix (n, n) at a position of the joint [rad or m]."""
+        """Return the matrix (n, n) at a position of the joint [rad or m].
+
+        Args:
+            q: position of the joint.
+        """
         first, *others = self.matrices
         factors = (q, q * q) if self.prismatic else (casadi.cos(q), casadi.sin(q))
         parts = [SX(f * part) for f, part in zip(factors, others, strict=False)]

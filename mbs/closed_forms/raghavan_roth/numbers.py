@@ -617,7 +617,10 @@ def _far_regularities(M: Array) -> Array:
 
 
 def _regularities(M: Array) -> Array:
-    """Return best reciprocal condition numbers (N,) over the offsets, for parts (N, n3, n, n)."""
+    """Return best reciprocal condition numbers (N,) over the offsets, for parts (N, n3, n, n).
+
+    M are the parts of the matrix of joint 3.
+    """
     most: Array = np.max(_far_regularities(M), axis=1)
     return most
 

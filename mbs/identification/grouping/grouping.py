@@ -50,7 +50,7 @@ def quotient(value: SX, divisor: SX) -> SX:
 
 
 def _factors(value: SX) -> list[SX]:
-    """Return the factors of a scalar product expression; a list of itself for other expressions."""
+    """Return factors of a scalar expression `value` that is a product; else the list [value]."""
     if value.is_op(casadi.OP_MUL):
         return _factors(value.dep(0)) + _factors(value.dep(1))
     if value.is_op(casadi.OP_SQ):
@@ -233,7 +233,7 @@ def _sign_and_text(coefficient: SX) -> tuple[str, str]:
 
 
 def _split_sign(value: SX) -> tuple[bool, SX]:
-    """Return whether a coefficient is written with a minus sign, and the coefficient without it."""
+    """Return whether a coefficient `value` is written with a minus, and its value without it."""
     if value.is_constant():
         return float(value) < 0, SX(abs(float(value)))
     if value.is_op(casadi.OP_NEG):
@@ -249,11 +249,12 @@ class _FactorText(Infix):
     """Text of a factor, with abs for absolute values."""
 
     def _call_text(self, op: int) -> str:
+        """Return the name of the function with CasADi operation `op`: abs for absolute values."""
         return "abs" if op == casadi.OP_FABS else super()._call_text(op)
 
 
 def _factor_text(value: SX) -> str:
-    """Return the text of an expression, in parentheses if it is a sum."""
+    """Return the text of a scalar expression `value`, in parentheses if it is a sum."""
     symbols = casadi.symvar(value)
     graph = graph_of(Function("value", [casadi.vertcat(SX(0, 1), *symbols)], [value], ["p"], ["y"]))
     return _FactorText(graph, {"p": [s.name() for s in symbols]}).text(graph.results[0][0], PRODUCT)

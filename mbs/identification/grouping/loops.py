@@ -131,7 +131,7 @@ def pair_relations(
 
 
 def _rotation(R: Array) -> SX:
-    """Return a constant rotation (3, 3) of closed configurations, with rounding errors removed."""
+    """Return a rotation R (3, 3) of all configurations, with rounding errors removed."""
     noise = 1e-12  # ten times the loop error: smaller elements are zeros
     return SX(DM(nearest_rotation(R.tolist(), noise=noise)))
 
@@ -249,7 +249,10 @@ def _velocity_matrices(system: System, configurations: ClosedConfigurations) -> 
 def _angular_velocities(
     system: System, configurations: Sequence[ClosedConfigurations], G: Array
 ) -> Array:
-    """Return the angular velocities (links, configurations, 3, m) in the frames of the links."""
+    """Return the angular velocities (links, configurations, 3, m) in the frames of the links.
+
+    G are the matrices of `_velocity_matrices`: from independent to tree velocities.
+    """
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     motions = link_velocities(system.tree, link_poses(system.tree, q), v)
     slopes = [casadi.densify(casadi.jacobian(motion.w, v)) for motion in motions]
@@ -261,9 +264,9 @@ def _angular_velocities(
 
 
 def _one_direction(rows: Array) -> Array | None:
-    """Return the constant direction (3,) of an angular velocity (configurations, 3, m), or None.
+    """Return constant direction (3,) of angular velocities `rows` (configurations, 3, m), or None.
 
-    None also if the angular velocity is always zero.
+    None if the direction varies or the angular velocity is always zero.
     """
     columns = rows.transpose(1, 0, 2).reshape(3, -1)
     U, sizes, _ = np.linalg.svd(columns, full_matrices=False)
@@ -285,9 +288,10 @@ def _inertia_effects(j: int, rows: Array) -> Iterator[Effect]:
 
 
 def _velocity_products(first: Array, second: Array) -> Array:
-    """Return the products of two velocities (configurations, m) as flattened quadratic forms.
+    """Return products of two velocities, `first` and `second` (configurations, m), as one vector.
 
-    The elements are coefficients of products of independent velocities.
+    Each product is a quadratic form in the m independent velocities; its coefficients are listed
+    for every configuration.
     """
     k, i = np.triu_indices(first.shape[1])
     return np.ravel(first[:, k] * second[:, i] + first[:, i] * second[:, k])

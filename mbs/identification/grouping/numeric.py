@@ -150,7 +150,11 @@ class States:
         return int(self.q.shape[1])
 
     def on_moving_base(self, seed: int) -> States:
-        """Return the states with a random velocity, acceleration and orientation of the base."""
+        """Return the states with a random velocity, acceleration and orientation of the base.
+
+        Args:
+            seed: seed of the random numbers.
+        """
         rng = np.random.default_rng(seed)
         v_0, a_0 = rng.uniform(-3, 3, (6, self.count)), rng.uniform(-5, 5, (6, self.count))
         turns = np.linalg.qr(rng.standard_normal((self.count, 3, 3)))[0]
@@ -251,7 +255,12 @@ class _ConfigurationWalk:
         return _ConfigurationWalk(system, closing, G, values, found.q, min(_LEAST_LEAD, leads / 4))
 
     def moved(self, q: Array, rng: np.random.Generator) -> Array:
-        """Return configuration (nq,) after eight steps from q; it turns back at singularities."""
+        """Return configuration (nq,) after eight steps from q; it turns back at singularities.
+
+        Args:
+            q: (nq,) closed configuration.
+            rng: random number generator of the directions.
+        """
         direction = rng.uniform(-1, 1, len(self.system.active))
         for _ in range(_STEPS):
             following = self._step(q, direction)
@@ -265,6 +274,9 @@ class _ConfigurationWalk:
         """Return the closed configuration (nq,) after a step along independent velocities (m,).
 
         None if the loops do not close nearby, or the result is near a singular configuration.
+
+        q is a closed configuration (nq,), `direction` (m,) the velocities; its length does not
+        matter.
         """
         p = self.closing.p
         arguments = (q, p) if p.size else (q,)
@@ -491,7 +503,7 @@ def _rank_text(count: int, rank: int, relations: Sequence[str]) -> str:
 
 
 def _gap_text(found: Dependence) -> str:
-    """Return text on the gap of the singular values at the rank; empty if the gap is infinite."""
+    """Return text on the gap of the singular values at rank in `found`; empty if it is infinite."""
     if np.isinf(found.gap):
         return ""
     doubt = ", so narrow that the rank is in doubt" if found.gap < _NARROW else ""

@@ -560,7 +560,7 @@ def _rises(placed: Layout, pill: PlacedEdge) -> bool:
 
 
 def _path_down(node: PlacedNode, pill: PlacedEdge) -> str:
-    """Return SVG path from a link `node` to a joint label `pill` below it or in the next column."""
+    """Return the SVG path from a link `node` to a joint `pill` below it or in the next column."""
     foot = node.y + node.height / 2
     if pill.y > foot:
         bend = (foot + pill.y - PILL / 2) / 2

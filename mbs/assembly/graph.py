@@ -396,7 +396,7 @@ def spanning_tree(
 
 
 def _describe_unreached(name: str, graph: BodyGraph, number: int) -> str:
-    """Return error message for the node `number` without a path to the world, in system `name`."""
+    """Return the error text for a node `number` without a path to the world, in system `name`."""
     holders = [e.joint for e in graph.edges if number in (e.a, e.b) and not e.joint.places]
     where = f"{name}: no chain of joints leads from the world to {graph.nodes[number].name!r}"
     if holders:

@@ -83,7 +83,7 @@ class _Pickler(pickle.Pickler):
         self.names_alone = False
 
     def persistent_id(self, obj: Any) -> int | None:
-        """Return index of an SX in `graphs`, to which it is added; None for any other object."""
+        """Return the index of an SX in `graphs`, to which it is added; None for other objects."""
         if not isinstance(obj, SX):
             return None
         self.graphs.append(obj)

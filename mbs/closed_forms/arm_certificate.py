@@ -63,8 +63,8 @@ def complex_candidates(prepared: Prepared, T: Array) -> Complex:
     """
     prepared = for_poses(prepared, T[None])[0][0]
     loop = prepared.arrangement
-    ways = loop.all_ways(T[None])
-    M = prepared.pencil.matrices(ways)
+    transforms = loop.transforms_for(T[None])
+    M = prepared.pencil.matrices(transforms)
     u = complex_roots(M)[0]
     u = u[np.abs(u.imag) < _FAR_ANGLE]
     matrices = at(np.repeat(M, len(u), axis=0), u)
@@ -78,21 +78,26 @@ def complex_candidates(prepared: Prepared, T: Array) -> Complex:
             x3 = np.repeat(np.tan(u[own] / 2), count)
             x = np.column_stack([x3, x4.ravel(), x5.ravel()])
             middle = np.where(loop.prismatic[2:5], x, 2 * np.arctan(x.astype(complex)))
-            every.append(_completed(ways[0], loop, middle[np.all(np.isfinite(middle), axis=1)]))
+            every.append(
+                _completed(transforms[0], loop, middle[np.all(np.isfinite(middle), axis=1)])
+            )
     whole = np.concatenate(every)
     return whole[np.all(np.isfinite(whole), axis=1)]
 
 
-def _completed(ways: Array, loop: Arrangement, middle: Complex) -> Complex:
+def _completed(transforms: Array, loop: Arrangement, middle: Complex) -> Complex:
     """Return arm configurations (m, 6) for positions (n, 3) of joints 3, 4 and 5 of its loop.
 
-    `ways` (6, 4, 4) are the constant transforms of the loop.
+    `transforms` (6, 4, 4) are the constant transforms of the loop.
     """
-    beyond, goal = np.tile(ways[1].astype(np.complex128), (len(middle), 1, 1)), inverse(ways[5])
+    beyond, goal = (
+        np.tile(transforms[1].astype(np.complex128), (len(middle), 1, 1)),
+        inverse(transforms[5]),
+    )
     for k in (2, 3, 4):
-        beyond = beyond @ motion(middle[:, k - 2], bool(loop.prismatic[k])) @ ways[k]
-    number, second = _second_positions(ways[0], loop.prismatic, beyond, goal)
-    near = ways[0] @ motion(second, bool(loop.prismatic[1])) @ beyond[number]
+        beyond = beyond @ motion(middle[:, k - 2], bool(loop.prismatic[k])) @ transforms[k]
+    number, second = _second_positions(transforms[0], loop.prismatic, beyond, goal)
+    near = transforms[0] @ motion(second, bool(loop.prismatic[1])) @ beyond[number]
     first = _first_positions(bool(loop.prismatic[0]), near, goal)
     left = inverse(motion(first, bool(loop.prismatic[0])) @ near) @ goal
     sixth = _angle(left[:, 0, 0] + left[:, 1, 1], left[:, 1, 0] - left[:, 0, 1])

@@ -148,9 +148,9 @@ def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Arr
     own, residual, _ = _output_arrays(len(q), arm.size)
     own[:] = q
     target = _targets(T, len(q))
-    stride, handed = 16 if target.ndim == 3 else 0, c_arm_of(arm)
+    stride, c_arm = 16 if target.ndim == 3 else 0, c_arm_of(arm)
     library.mbs_polish(
-        handed.address, _address(target), stride, len(q), _address(own), _address(residual)
+        c_arm.address, _address(target), stride, len(q), _address(own), _address(residual)
     )
     return own, residual
 
@@ -172,9 +172,9 @@ def found_by(
     """
     target = _c_array(T, 4, 4)
     q, residual, hits = _output_arrays(starts, arm.size)
-    handed = c_arm_of(arm)
+    c_arm = c_arm_of(arm)
     count = library.mbs_search(
-        handed.address,
+        c_arm.address,
         _address(target),
         starts,
         seed,
@@ -197,9 +197,9 @@ def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array
     target = _c_array(T, 4, 4)
     own, residual, hits = _output_arrays(len(q), arm.size)
     own[:] = q
-    handed = c_arm_of(arm)
+    c_arm = c_arm_of(arm)
     count = library.mbs_merge(
-        handed.address,
+        c_arm.address,
         _address(target),
         len(q),
         _address(own),
@@ -220,8 +220,8 @@ def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int)
         seed: seed of the random numbers.
     """
     target, q = _c_array(T, 4, 4), np.empty(arm.size)
-    handed = c_arm_of(arm)
-    library.mbs_nearest(handed.address, _address(target), starts, seed, _address(q))
+    c_arm = c_arm_of(arm)
+    library.mbs_nearest(c_arm.address, _address(target), starts, seed, _address(q))
     return q
 
 
@@ -235,8 +235,8 @@ def singular_by(library: ctypes.CDLL, arm: Arm, q: Array, bound: float) -> NDArr
         bound: bound of the singular value, with lengths in arm lengths.
     """
     own, singular = _c_array(q, len(q), arm.size), np.empty(len(q), dtype=bool)
-    handed = c_arm_of(arm)
-    library.mbs_singular(handed.address, bound, len(q), _address(own), singular.ctypes.data)
+    c_arm = c_arm_of(arm)
+    library.mbs_singular(c_arm.address, bound, len(q), _address(own), singular.ctypes.data)
     return singular
 
 
@@ -260,10 +260,10 @@ def corrected_by(
     m, n = len(x), arm.size
     own = np.array(np.broadcast_to(x, (m, n)), dtype=float, order="C")
     target = _targets(T, m)
-    stride, handed = 16 if target.ndim == 3 else 0, c_arm_of(arm)
+    stride, c_arm = 16 if target.ndim == 3 else 0, c_arm_of(arm)
     rows, right = _c_array(held, m, n), _c_array(value, m)
     library.mbs_correct(
-        handed.address,
+        c_arm.address,
         _address(target),
         stride,
         m,
@@ -285,10 +285,10 @@ def residual_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> Array:
         q: (m, n) configurations [rad or m].
     """
     own, target, residual = _c_array(q, *q.shape), _targets(T, len(q)), np.empty(len(q))
-    handed = c_arm_of(arm)
+    c_arm = c_arm_of(arm)
     stride = 16 if target.ndim == 3 else 0
     library.mbs_residual(
-        handed.address, _address(target), stride, len(q), _address(own), _address(residual)
+        c_arm.address, _address(target), stride, len(q), _address(own), _address(residual)
     )
     return residual
 
@@ -307,10 +307,10 @@ def examined_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Arr
     m, n = q.shape
     own, target = _c_array(q, m, n), _targets(T, m)
     gap, J = np.empty((m, 6)), np.empty((m, n, 6))
-    handed = c_arm_of(arm)
+    c_arm = c_arm_of(arm)
     stride = 16 if target.ndim == 3 else 0
     library.mbs_examine(
-        handed.address, _address(target), stride, m, _address(own), _address(gap), _address(J)
+        c_arm.address, _address(target), stride, m, _address(own), _address(gap), _address(J)
     )
     return gap, np.swapaxes(J, 1, 2)
 
@@ -329,9 +329,9 @@ def on_sphere_by(
         x: (m, n) first guesses.
     """
     own, middle = np.array(x, dtype=float, order="C"), _c_array(centre, arm.size)
-    target, handed = _c_array(T, 4, 4), c_arm_of(arm)
+    target, c_arm = _c_array(T, 4, 4), c_arm_of(arm)
     library.mbs_reach_sphere(
-        handed.address, _address(target), _address(middle), radius, len(own), _address(own)
+        c_arm.address, _address(target), _address(middle), radius, len(own), _address(own)
     )
     return own
 
@@ -366,9 +366,9 @@ def reduced_by(
     held = [np.ascontiguousarray(part, dtype=float) for part in parts]
     own = _ReductionStruct(corank, *map(_address, held))
     x, g = np.empty((count, arm.size)), np.empty((count, len(held[2])))
-    target, given, handed = _c_array(T, 4, 4), _c_array(h, count, corank), c_arm_of(arm)
+    target, given, c_arm = _c_array(T, 4, 4), _c_array(h, count, corank), c_arm_of(arm)
     found = library.mbs_reduced(
-        handed.address,
+        c_arm.address,
         _address(target),
         ctypes.addressof(own),
         count,
@@ -403,9 +403,9 @@ def walked_by(
     """
     points, target = np.empty((most + 1, arm.size)), _c_array(T, 4, 4)
     points[0] = start
-    along, closed, handed = _c_array(tangent, arm.size), ctypes.c_int(0), c_arm_of(arm)
+    along, closed, c_arm = _c_array(tangent, arm.size), ctypes.c_int(0), c_arm_of(arm)
     count = library.mbs_walk(
-        handed.address,
+        c_arm.address,
         _address(target),
         _address(along),
         limit,
@@ -430,7 +430,7 @@ def rounded_by(library: ctypes.CDLL, T: Array) -> Array | None:
 
 def settled_by(
     library: ctypes.CDLL,
-    handed: CArm,
+    c_arm: CArm,
     T: Array,
     every: tuple[Array, ...],
     bounds: tuple[float, float],
@@ -439,7 +439,7 @@ def settled_by(
 
     Args:
         library: run-time library.
-        handed: arm as a C structure.
+        c_arm: arm as a C structure.
         T: (4, 4) rigid transform [m].
         every: q (branches, n) and residual (branches,), both overwritten; real and regular
             (branches,).
@@ -454,7 +454,7 @@ def settled_by(
     number, count = np.empty(len(residual)), ctypes.c_longlong(0)
     target = _c_array(T, 4, 4)
     doubtful = library.mbs_settle(
-        handed.address,
+        c_arm.address,
         _address(target),
         len(residual),
         *map(_address, every),
@@ -534,7 +534,7 @@ class _LoopStruct(ctypes.Structure):
         ("sign", _int),
         ("slides", _int * 6),
         ("offsets", _double * 6),
-        ("ways", _double * 16 * 6),
+        ("transforms", _double * 16 * 6),
         ("place", _int),
         ("after", _double * 16),
         ("length", _double),
@@ -574,7 +574,7 @@ class CLoop:
             loop.sign,
             (_int * 6)(*map(int, loop.prismatic)),
             (_double * 6)(*loop.offsets.tolist()),
-            (_double * 16 * 6)(*((_double * 16)(*way.ravel().tolist()) for way in loop.ways)),
+            (_double * 16 * 6)(*((_double * 16)(*way.ravel().tolist()) for way in loop.transforms)),
             loop.index,
             (_double * 16)(*loop.after.ravel().tolist()),
             loop.length,
@@ -590,12 +590,12 @@ class CLoop:
         self.address: int = ctypes.addressof(self.loop)
 
 
-def solved_by(library: ctypes.CDLL, handed: CLoop, T: Array) -> tuple[Numbers, Array]:
+def solved_by(library: ctypes.CDLL, c_loop: CLoop, T: Array) -> tuple[Numbers, Array]:
     """Return the solutions of the general method (Raghavan and Roth) for many poses.
 
     Args:
         library: run-time library.
-        handed: arm prepared for the general method.
+        c_loop: arm prepared for the general method.
         T: (N, 4, 4) target poses [m].
 
     Returns:
@@ -608,8 +608,8 @@ def solved_by(library: ctypes.CDLL, handed: CLoop, T: Array) -> tuple[Numbers, A
     found = list[tuple[Numbers, Array]]()
     while start < len(target) or not found:
         count = library.mbs_general(
-            handed.arm.address,
-            handed.address,
+            c_loop.arm.address,
+            c_loop.address,
             target[start:].ctypes.data,
             len(target) - start,
             room,
@@ -626,16 +626,16 @@ def solved_by(library: ctypes.CDLL, handed: CLoop, T: Array) -> tuple[Numbers, A
     return np.concatenate(numbers), np.concatenate(configurations)
 
 
-def candidates_by(library: ctypes.CDLL, handed: CLoop, T: Array) -> Array:
+def candidates_by(library: ctypes.CDLL, c_loop: CLoop, T: Array) -> Array:
     """Return configurations (m, 6) that may reach a pose, neither polished nor checked.
 
     Args:
         library: run-time library.
-        handed: arm prepared for the general method.
+        c_loop: arm prepared for the general method.
         T: (4, 4) target pose [m].
     """
     target, q = _c_array(T, 4, 4), np.empty((_CANDIDATES, 6))
-    return q[: library.mbs_candidates(handed.address, _address(target), _address(q))].copy()
+    return q[: library.mbs_candidates(c_loop.address, _address(target), _address(q))].copy()
 
 
 # General method of an arm as a Function with C code that contains the numbers of the arm.
@@ -686,13 +686,13 @@ class SolverStruct(ctypes.Structure):
 
 
 def general_function(
-    name: str, handed: CLoop, indices: Sequence[int], others: Array, nearly: float
+    name: str, c_loop: CLoop, indices: Sequence[int], others: Array, nearly: float
 ) -> Function:
     """Return the Function ``name(T) -> q, valid, count, certain`` of the general method, in C.
 
     Args:
         name: prefix of the name of the function.
-        handed: arm prepared for the general method.
+        c_loop: arm prepared for the general method.
         indices: (6,) indices of the joints of the arm among the coordinates.
         others: (nq,) positions of all coordinates [rad or m]. Joints of the arm are ignored.
         nearly: singular value of the Jacobian below which configurations may be missing.
@@ -704,7 +704,7 @@ def general_function(
         Function of the target pose T (4, 4): configurations q (nq, 16), mask valid (16, 1), number
         count of configurations, and certain, which is 0 if configurations may be missing.
     """
-    nq, arm = len(others), handed.arm
+    nq, arm = len(others), c_loop.arm
     solver = SolverStruct(nearly=nearly, nq=nq)
     of_arm = {"gaps": "FUNCTION_gaps", "slides": "FUNCTION_prismatic"}
     of_solver = {"robot": "&FUNCTION_arm", "loop": "&FUNCTION_loop0"}
@@ -713,7 +713,7 @@ def general_function(
         gaps=_initializer(arm.gaps.ravel()),
         slides=_initializer(arm.slides),
         arm=_initializer(arm.arm, of_arm),
-        loops=_loop_tables(handed),
+        loops=_loop_tables(c_loop),
         indices=_initializer(indices),
         others=_initializer(others),
         solver=_initializer(solver, of_solver),
@@ -735,17 +735,17 @@ def general_function(
     return handwritten(signature, jacobian, own, _files(_SOURCES), work)
 
 
-def _loop_tables(handed: CLoop, number: int = 0) -> str:
+def _loop_tables(c_loop: CLoop, number: int = 0) -> str:
     """Return the C text of a prepared loop with index `number`, after those of its alternatives."""
     owned, text = dict[str, str](), ""
-    if handed.next is not None:
-        text += _loop_tables(handed.next, number + 1)
+    if c_loop.next is not None:
+        text += _loop_tables(c_loop.next, number + 1)
         owned["next"] = f"&FUNCTION_loop{number + 1}"
-    if handed.loop.mix:
-        mix = _initializer(handed.mix.ravel())
+    if c_loop.loop.mix:
+        mix = _initializer(c_loop.mix.ravel())
         text += f"static const double FUNCTION_mix{number}[] = {mix};\n"
         owned["mix"] = f"FUNCTION_mix{number}"
-    loop = _initializer(handed.loop, owned)
+    loop = _initializer(c_loop.loop, owned)
     return f"{text}static const roth_loop FUNCTION_loop{number} = {loop};\n"
 
 

@@ -225,12 +225,12 @@ class General:
     Attributes:
         arm: arm of six joints.
         prepared: loop and matrices that the method selected for the arm.
-        handed: arm and selection as structures for the compiled library.
+        c_loop: arm and selection as structures for the compiled library.
     """
 
     arm: Arm
     prepared: Prepared
-    handed: CLoop
+    c_loop: CLoop
 
 
 def general_of(arm: Arm) -> General:
@@ -278,4 +278,4 @@ def general_many(arm: General, T: Array) -> tuple[Numbers, Array]:
     Returns:
         (m,) indices of the poses, ascending, and (m, 6) configurations for them.
     """
-    return solved_by(core.core_of(arm.arm), arm.handed, T)
+    return solved_by(core.core_of(arm.arm), arm.c_loop, T)

@@ -31,7 +31,7 @@ LINEAR = np.array([0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11])
 
 
 def _skew(t: Array) -> Array:
-    """Return the matrix (3, 3) of the cross product with t (3,)."""
+    """Return the matrix (3, 3) of the cross product with t (3,): skew(t) a = t x a."""
     return np.array([[0, -t[2], t[1]], [t[2], 0, -t[0]], [-t[1], t[0], 0]])
 
 
@@ -71,7 +71,9 @@ KEPT_BY_SLIDE = np.array([3, 4, 6, 7, 8, 11])
 
 
 def frame_products(T: Field) -> Field:
-    """Return w (..., 15) of the origin and the z axis of frames.
+    """Return the 15 products w (..., 15) of the origin p and the z axis l of frames.
+
+    They are 1, p.p, p.l, p, l, p x l and p.p l - 2 (p.l) p. A displacement maps them linearly.
 
     Args:
         T: (..., 4, 4) poses.
@@ -133,7 +135,7 @@ def half_parts(prismatic: bool) -> Array:
 
 
 def symbolic_rho(pose: Pose, opposite: Pose) -> SX:
-    """Return the matrix (15, 15) of a pose that acts on w, as a sparse expression.
+    """Return the matrix (15, 15) of a pose that acts on w of `frame_products`, a sparse expression.
 
     Args:
         pose: pose of a frame.

@@ -6,7 +6,13 @@ import casadi
 from casadi import SX
 
 from mbs.closed_forms.centres import with_spherical
-from mbs.closed_forms.ring import always_zero, gap_samples, is_planar, with_elbow, without_idle
+from mbs.closed_forms.ring import (
+    always_zero,
+    gap_samples,
+    is_planar,
+    with_elbow,
+    without_unused_freedom,
+)
 from mbs.closed_forms.roots import (
     LoopBranches,
     Positions,
@@ -163,7 +169,7 @@ def planar(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     ring = with_spherical(ring, q, p)
     spherical = sum(joint.motion is _SPHERICAL for joint in ring.joints)
     while len(ring.joints) > 3 and not spherical:
-        smaller = without_idle(ring, gap_samples(ring, q, p))
+        smaller = without_unused_freedom(ring, gap_samples(ring, q, p))
         if smaller is ring:
             return None
         ring = smaller

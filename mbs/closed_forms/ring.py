@@ -283,7 +283,7 @@ def constants(values: SX, q: SX, p: SX) -> list[float | None]:
     return [float(x) if fixed else None for x, fixed in zip(samples[0], same, strict=True)]
 
 
-def without_idle(ring: Ring, samples: list[list[Matrix]]) -> Ring:
+def without_unused_freedom(ring: Ring, samples: list[list[Matrix]]) -> Ring:
     """Return the loop without one freedom of its cut joint that a plane loop never uses.
 
     Such a freedom is a translation along the normal, or a rotation about an axis in the plane. The

@@ -525,7 +525,10 @@ def _trigonometric(b: SX, t: SX) -> tuple[SX, SX]:
 
 
 def _quartic(b: SX, r: SX) -> tuple[SX, SX]:
-    """Return the quartic with coefficients b at r and its slope, divided by (1 + r^2)^2."""
+    """Return (value, slope) of the quartic with coefficients b (5, 1) at r, divided by (1 + r^2)^2.
+
+    The slope is the derivative of the quartic by r.
+    """
     value = (((b[0] * r + b[1]) * r + b[2]) * r + b[3]) * r + b[4]
     slope = ((4 * b[0] * r + 3 * b[1]) * r + 2 * b[2]) * r + b[3]
     size = (1 + r * r) ** 2

@@ -186,7 +186,7 @@ def confine(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def _normal(ring: Ring, q: SX, p: SX) -> SX | None:
-    """Return normal (3, 1) of the plane of motion of joints 2 and 3, in the frame before joint 2.
+    """Return the normal (3, 1) of the plane of motion of joints 2 and 3, before joint 2.
 
     None if they do not keep a point in a plane.
 

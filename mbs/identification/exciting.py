@@ -250,7 +250,7 @@ as zero. Rounding errors of sines are 1e-16; the smallest nonzero elements are f
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SearchEnd:
+class OptimisationEnd:
     """Result of an optimisation.
 
     Attributes:
@@ -341,7 +341,7 @@ class Programme:
 
     def improve(
         self, x: Array, tightened: Array, rounds: int, watch: Watch | None = None
-    ) -> SearchEnd:
+    ) -> OptimisationEnd:
         """Minimise the criterion within the limits.
 
         Args:
@@ -369,7 +369,7 @@ class Programme:
         answer = solver(x0=x, lbg=lower, ubg=upper)
         status = solver.stats()
         reached = np.array(answer["g"]).ravel()
-        return SearchEnd(
+        return OptimisationEnd(
             np.array(answer["x"]).ravel(),
             float(answer["f"]),
             float(np.maximum(lower - reached, reached - upper).max()),

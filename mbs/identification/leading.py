@@ -55,7 +55,7 @@ def leads_of(system: System, q: Array) -> Array:
 
 
 def signed_leads(system: System) -> Function:
-    """Return the Function ``leads(q)`` of the value of `leads_of`, for use in an optimisation.
+    """Return Function ``leads(q)``: signed distance from singular configurations, see `leads_of`.
 
     The value is never negative if there are more than 8 passive joints.
 

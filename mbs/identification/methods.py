@@ -62,7 +62,7 @@ class Setting:
             return self.bodies
         return consistent_weighted(self.full.at(part.time), self.prior)
 
-    def moving(self, part: Observations) -> Array:
+    def simulation_values(self, part: Observations) -> Array:
         """Return values (k,) of the full parameter set with which the robot is simulated.
 
         They are the values of `bodies_of(part)`. If that search does not converge, they are the
@@ -81,7 +81,7 @@ def _instrumental_estimator(setting: Setting) -> Estimator:
     """Return instrumental-variable estimator; the robot is simulated with the data in `setting`."""
 
     def estimator(observations: Observations) -> Estimate:
-        values = setting.moving(observations)
+        values = setting.simulation_values(observations)
         moved = [simulated_motion(setting.model, values, one) for one in setting.samples]
         whole = stacked([observe_filtered(setting.model, one) for one in moved])
         instruments = whole.grouped(setting.base)

@@ -81,7 +81,7 @@ def interpolated(values: Array, good: Chosen) -> Array:
     return flat.reshape(values.shape)
 
 
-def without(time: Array, bad: Array, ahead: float, back: float) -> Chosen:
+def outside_windows(time: Array, bad: Array, ahead: float, back: float) -> Chosen:
     """Return a mask (n,) of the instants t that have no bad instant in [t - back, t + ahead].
 
     Args:
@@ -442,7 +442,7 @@ def clear_of_singular(
         after: length of the window before that instant [s]. The default is the same length.
     """
     bad = samples.time[~regular_samples(model, samples)]
-    keep = without(found.time, bad, before, before if after is None else after)
+    keep = outside_windows(found.time, bad, before, before if after is None else after)
     return replace(found.at(found.time[keep]), dropped=int(np.sum(~keep)))
 
 

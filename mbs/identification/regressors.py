@@ -521,7 +521,7 @@ class JointColumns:
             total += self._moment_efforts(self._twists(rotor.carrier), spin)
         return total
 
-    def rest(self, column: Column) -> SX:
+    def remaining_effort(self, column: Column) -> SX:
         """Return the efforts that are not the rate of `momentum` (nv, 1), per unit of a parameter.
 
         These are the joint efforts minus the time derivative of the generalised momentum.
@@ -555,7 +555,7 @@ class JointColumns:
         """
         if column.kind in _INERTIAS:
             return SX(0)
-        return SX(casadi.dot(self.v, self.rest(column)))
+        return SX(casadi.dot(self.v, self.remaining_effort(column)))
 
     def _own_effort(self, column: Column, v: SX, a: SX) -> SX:
         """Return the joint efforts (nv, 1) of a unit parameter that acts on its own joint only.
@@ -945,7 +945,7 @@ def filtered_regressor(
         )
         D2 = s.reduced_effort(
             matrix_of_columns(
-                taken, rests, lambda c: laws.effort(c) if c.symbol else joints.rest(c)
+                taken, rests, lambda c: laws.effort(c) if c.symbol else joints.remaining_effort(c)
             )
         )
         if s.reduction is not None:

@@ -365,7 +365,7 @@ def _labels(system: System, branch: Branch) -> list[str]:
 
 
 def _way(system: System, stage: Stage, labels: Sequence[str]) -> int:
-    """Return the branch index of a stage: the branch in `labels`, else the assembled branch.
+    """Return the branch index of a stage: that of its label in `labels`, else of the assembly.
 
     Raises ModelError if `labels` contains two of its branches.
     """

@@ -261,7 +261,7 @@ def _measures(system: System, p: Matrix) -> tuple[Matrix, Matrix]:
 
 
 def _ranks(jacobians: Sequence[Matrix]) -> list[int]:
-    """Return rank of each matrix in `jacobians`, relative to the largest singular value of all."""
+    """Return the rank of each of the `jacobians`, relative to the largest singular value of all."""
     values = [np.linalg.svd(_without_zeros(matrix), compute_uv=False) for matrix in jacobians]
     largest = max(float(np.max(row, initial=0.0)) for row in values)
     return [int(np.sum(row > _GAP * largest)) for row in values]

@@ -252,7 +252,7 @@ class Closing:
         return float(np.max(np.abs(self.rows(q)[0]) / self.sizes, initial=0.0))
 
     def nearest(self, q: Vector) -> Closed:
-        """Return the closed configuration that Gauss-Newton reaches by changing the free positions.
+        """Return the result of Gauss-Newton, which changes the free positions to close the loops.
 
         Args:
             q: (nq,) start. Its locked positions are kept.

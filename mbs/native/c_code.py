@@ -548,7 +548,7 @@ class BlockCode:
         return [self._repeat(*item) for item in self.where.tables.items()]
 
     def _repeat(self, repeat: Repeat, table: CallTable) -> str:
-        """Return C function of a recurring sequence, with its tables of work indices and constants.
+        """Return the C function of a recurring sequence and its tables of indices and constants.
 
         `repeat` is the sequence, `table` the work indices that each occurrence uses.
         """
@@ -590,7 +590,7 @@ class BlockCode:
         return "".join(f"; {verb} {in_c_comment(names)}" for verb, names in words.items() if names)
 
     def _calls(self, step: Calls) -> str:
-        """Return C line of a `step` that calls consecutive occurrences of a sequence, in a loop."""
+        """Return the C line of a `step` that calls consecutive occurrences of a sequence."""
         name, table = self._repeat_name(step.repeat), self.where.tables[step.repeat]
         loop = f"for (int k = {step.first}; k < {step.first + step.count}; ++k) "
         index = "k" if step.count > 1 else str(step.first)
@@ -716,7 +716,7 @@ class BlockCode:
 
 
 def _index(largest: int) -> str:
-    """Return C type of an index table: "unsigned short" if `largest` is below 2^16, else "int"."""
+    """Return the C type of an index: "unsigned short" if `largest` is below 2^16, else "int"."""
     return "unsigned short" if largest < 1 << 16 else "int"
 
 

@@ -268,9 +268,11 @@ def _splits_to(
 
 
 def _new_rows(axis: int, start: int, prismatic: bool) -> tuple[int, ...]:
-    """Return the indices in w of the equations that are new if the reference frame is `start`.
+    """Return indices in w (15,) of the equations that are new if the reference frame is `start`.
 
     `axis` is the index of the observed axis, and `prismatic` the type of the joint at `start`.
+
+    w are the products of `frame_products`, equal on both paths around the loop.
     """
     after = start % 2 == 1
     if axis == 2:
@@ -323,7 +325,8 @@ def _with_joint(side: Side, k: int, basis: Tensor) -> Side:
 def _pieces(knowledge: KnownFrames, block: slice) -> _Pieces:
     """Return the matrices of the unknown joints and of the transforms between them.
 
-    The slice `block` selects rows and columns of the representation on w (15,).
+    The slice `block` selects rows and columns of the matrices that act on w (15,), see
+    `frame_products`.
     """
     joints = knowledge.unknown
     gaps = [_merged_transform(knowledge, k) for k in joints]

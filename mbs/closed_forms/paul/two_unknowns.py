@@ -160,7 +160,10 @@ def _spread(G: list[Complex]) -> list[Complex]:
 
 
 def _form_of_values(row: Equation, stays: int) -> _Form:
-    """Return form of an equation `row` with numeric coefficients; the variable `stays` remains."""
+    """Return an equation `row` as Re(G(y) e^iq) + B(y) = 0 with numeric coefficients.
+
+    `stays` is the index (0 or 1) of the variable y that remains; q is eliminated.
+    """
 
     def part(key: Key) -> Complex:
         values = row.at(key)
@@ -170,9 +173,11 @@ def _form_of_values(row: Equation, stays: int) -> _Form:
 
 
 def _form(row: Equation, stays: int, part: Callable[[Key], Complex]) -> _Form:
-    """Return the form of an equation; `part` returns X and Y of the coefficient with a key.
+    """Return an equation as Re(G(y) e^iq) + B(y) = 0, in the remaining unknown y and the other, q.
 
     `stays` is the index (0 or 1) of the variable y that remains.
+
+    `part` maps the exponents of a product of the variables to its coefficients X and Y.
     """
     prismatic = row.variables[stays].prismatic
 

@@ -41,15 +41,15 @@ _ZERO = 1e-12
 a zero has rounding of 1e-14, and other entries are larger at one of the generic samples."""
 
 
-def table(elimination: Elimination, ways: Sequence[Pose]) -> SX:
+def table(elimination: Elimination, transforms: Sequence[Pose]) -> SX:
     """Return the equations of a loop (s - 1, m + n3 n4 n5), one column per monomial.
 
     Args:
         elimination: elimination of joints 1 and 2. Their m = n1 n2 - 1 monomials are the first
             columns. Then follow the columns of x4^i x5^j for each part of joint 3.
-        ways: six constant transforms of the loop.
+        transforms: six constant transforms of the loop.
     """
-    right, left = _right_side(elimination, ways), _left_side(elimination, ways)
+    right, left = _right_side(elimination, transforms), _left_side(elimination, transforms)
     sides = (
         part - casadi.mtimes(right[:, 0], SX(DM(one)).T)
         for part, one in zip(left, elimination.one, strict=True)
@@ -135,24 +135,27 @@ def _without_vanishing(row: SX, values: Array) -> SX:
     return cleared
 
 
-def _right_side(elimination: Elimination, ways: Sequence[Pose]) -> SX:
+def _right_side(elimination: Elimination, transforms: Sequence[Pose]) -> SX:
     """Return the side of the loop equation with joints 1 and 2, (s, n1 n2), by their monomials.
 
-    `ways` are the six transforms of the loop; `way` k follows joint k.
+    `transforms` are the six transforms of the loop; transform k follows joint k.
     """
-    u = _origin_axis_products(ways[5].inverse())[elimination.elements.tolist()]
-    once = _carry(elimination, ways[0].inverse(), _products_with_parts(elimination.first, u))
-    return _carry(elimination, ways[1].inverse(), _products_with_parts(elimination.second, once))
+    u = _origin_axis_products(transforms[5].inverse())[elimination.elements.tolist()]
+    once = _carry(elimination, transforms[0].inverse(), _products_with_parts(elimination.first, u))
+    return _carry(
+        elimination, transforms[1].inverse(), _products_with_parts(elimination.second, once)
+    )
 
 
-def _left_side(elimination: Elimination, ways: Sequence[Pose]) -> list[SX]:
+def _left_side(elimination: Elimination, transforms: Sequence[Pose]) -> list[SX]:
     """Return the side of the loop equation with joints 3, 4 and 5, for each part of joint 3.
 
-    `ways` are the six transforms of the loop. The columns are the monomials of joints 4 and 5.
+    `transforms` are the six transforms of the loop. The columns are the monomials of joints 4
+    and 5.
     """
-    w = _origin_axis_products(ways[4])[elimination.elements.tolist()]
-    once = _carry(elimination, ways[3], _products_with_parts(elimination.fifth, w))
-    twice = _carry(elimination, ways[2], _products_with_parts(elimination.fourth, once))
+    w = _origin_axis_products(transforms[4])[elimination.elements.tolist()]
+    once = _carry(elimination, transforms[3], _products_with_parts(elimination.fifth, w))
+    twice = _carry(elimination, transforms[2], _products_with_parts(elimination.fourth, once))
     return [_products_with_parts(part[None], twice) for part in elimination.third]
 
 
@@ -162,7 +165,10 @@ def _products_with_parts(parts: Array, columns: SX) -> SX:
 
 
 def _carry(elimination: Elimination, T: Pose, columns: SX) -> SX:
-    """Return `columns` (s, n) of w after the transform T, for the s used elements of w."""
+    """Return `columns` (s, n) of w after the transform T, for the s used elements of w.
+
+    w are the 15 products of `frame_products`.
+    """
     own = elimination.elements.tolist()
     X = SX(SIZE, SIZE)
     for t, slope in zip(casadi.vertsplit(T.p), SLOPES, strict=True):
@@ -236,7 +242,7 @@ class _Loop:
         return self.pencil.merit * (_FOLDED if constant else 1.0)
 
     @property
-    def ways(self) -> list[Pose]:
+    def transforms(self) -> list[Pose]:
         """Transforms in units of the length: transform k follows joint k."""
         gaps = (*self.ring.gaps[1:], self.ring.gaps[0])
         return [Pose(gap.pose.R, gap.pose.p / self.length) for gap in gaps]
@@ -279,8 +285,8 @@ def _loops(problem: Problem) -> list[_Loop]:
             prismatic = np.array([not joint.is_rotational for joint in own.joints])
             if prismatic[5]:
                 continue
-            ways = _numeric_transforms(problem, own, length)
-            pencils = (pencil(elimination, ways) for elimination in eliminations(prismatic))
+            transforms = _numeric_transforms(problem, own, length)
+            pencils = (pencil(elimination, transforms) for elimination in eliminations(prismatic))
             found += [_Loop(own, one, length) for one in pencils if one.regularity > REGULAR]
     return found
 
@@ -297,15 +303,15 @@ def _numeric_transforms(problem: Problem, ring: Ring, length: float) -> Array:
     """Return the transforms (samples, 6, 4, 4) of a loop at the samples, in units of `length`."""
     gaps = (*ring.gaps[1:], ring.gaps[0])
     stacked = problem.at_samples(SX(casadi.vertcat(*(gap.pose.matrix for gap in gaps))))
-    ways = np.array(stacked).reshape(len(stacked), 6, 4, 4)
-    ways[..., :3, 3] /= length
-    return ways
+    transforms = np.array(stacked).reshape(len(stacked), 6, 4, 4)
+    transforms[..., :3, 3] /= length
+    return transforms
 
 
 def _characteristic(problem: Problem, loop: _Loop) -> Characteristic:
     """Return the matrix of a loop whose determinant vanishes at the positions of joint 3."""
     elimination, joint = loop.pencil.elimination, loop.ring.joints[2]
-    A = table(elimination, loop.ways)
+    A = table(elimination, loop.transforms)
     columns = len(elimination.first) * len(elimination.second) - 1
     E, values = eliminated(A, np.array(problem.at_samples(A)), columns, loop.pencil.rank)
     count = len(elimination.third)

@@ -76,27 +76,27 @@ class Elimination:
         """Size of the square matrix: number of monomials."""
         return self.grid[0] * self.grid[1]
 
-    def right_side(self, ways: Array) -> Array:
+    def right_side(self, transforms: Array) -> Array:
         """Return coefficients (N, s - 1, n1 n2) of the monomials of joints 1 and 2, 1 as the first.
 
         Args:
-            ways: (N, 6, 4, 4) constant transforms of the loop.
+            transforms: (N, 6, 4, 4) constant transforms of the loop.
         """
-        u = frame_products(inverse(ways[:, 5]))[:, self.elements]
-        once = self._carry(inverse(ways[:, 0]), np.einsum("jab,nb->naj", self.first, u))
+        u = frame_products(inverse(transforms[:, 5]))[:, self.elements]
+        once = self._carry(inverse(transforms[:, 0]), np.einsum("jab,nb->naj", self.first, u))
         twice = np.einsum("iab,nbj->naij", self.second, once)
-        return self._carry(inverse(ways[:, 1]), twice.reshape(*u.shape, -1))[:, 1:]
+        return self._carry(inverse(transforms[:, 1]), twice.reshape(*u.shape, -1))[:, 1:]
 
-    def left_side(self, ways: Array) -> Array:
+    def left_side(self, transforms: Array) -> Array:
         """Return coefficients (N, n3, s - 1, n4 n5) of x4^i x5^j, for each weight of joint 3.
 
         Args:
-            ways: (N, 6, 4, 4) constant transforms of the loop.
+            transforms: (N, 6, 4, 4) constant transforms of the loop.
         """
-        w = frame_products(ways[:, 4])[:, self.elements]
-        once = self._carry(ways[:, 3], np.einsum("jab,nb->naj", self.fifth, w))
+        w = frame_products(transforms[:, 4])[:, self.elements]
+        once = self._carry(transforms[:, 3], np.einsum("jab,nb->naj", self.fifth, w))
         twice = np.einsum("iab,nbj->naij", self.fourth, once)
-        twice = self._carry(ways[:, 2], twice.reshape(*w.shape, -1))
+        twice = self._carry(transforms[:, 2], twice.reshape(*w.shape, -1))
         left: Array = np.einsum("kab,nbm->nkam", self.third, twice)[:, :, 1:]
         return left
 
@@ -126,7 +126,10 @@ class Elimination:
         return M.reshape(*M.shape[:3], -1)
 
     def _carry(self, T: Array, columns: Array) -> Array:
-        """Return the used elements of columns of w after displacements T (N, 4, 4)."""
+        """Return the used elements of columns of w after displacements T (N, 4, 4).
+
+        w are the 15 products of `frame_products`; `columns` has them in its rows.
+        """
         moved: Array = rho(T)[:, self.elements[:, None], self.elements] @ columns
         return moved
 
@@ -179,7 +182,10 @@ def eliminations(prismatic: Joints) -> list[Elimination]:
 
 
 def _elimination(prismatic: Joints, elements: NDArray[np.int64], raised: int) -> Elimination:
-    """Return the elimination with `elements` of w; `raised`: 0 for products by x4, 1 by x5."""
+    """Return the elimination with `elements` of w; `raised`: 0 for products by x4, 1 by x5.
+
+    w are the 15 products of `frame_products`; x4 and x5 are half-angle tangents of joints 4 and 5.
+    """
     slides = [bool(joint) for joint in prismatic]
     highest = 3 if len(elements) == SIZE else 2
     counts = [highest if slide else 3 for slide in slides]
@@ -276,7 +282,7 @@ class Arrangement:
         sign: +1, or -1 if the loop runs against the arm.
         prismatic: (6,) whether each joint of the loop is prismatic.
         offsets: (6,) angles at which the loop's joints are zero [rad]; 0 for prismatic joints.
-        ways: (6, 4, 4) constant transforms. The transform at `index` ends where the pose begins.
+        transforms: (6, 4, 4) constant transforms; that at `index` ends where the pose begins.
         index: index of the transform with the pose.
         after: (4, 4) transform after the pose in that transform.
         length: unit of lengths [m].
@@ -286,12 +292,12 @@ class Arrangement:
     sign: int
     prismatic: NDArray[np.bool_]
     offsets: Array
-    ways: Array
+    transforms: Array
     index: int
     after: Array
     length: float
 
-    def all_ways(self, T: Array) -> Array:
+    def transforms_for(self, T: Array) -> Array:
         """Return the transforms (N, 6, 4, 4) of the loop for target poses.
 
         Args:
@@ -299,9 +305,9 @@ class Arrangement:
         """
         T = _scale(T, self.length)
         pose = inverse(T) if self.sign > 0 else T
-        ways = np.broadcast_to(self.ways, (len(T), 6, 4, 4)).copy()
-        ways[:, self.index] = ways[:, self.index] @ pose @ self.after
-        return ways
+        transforms = np.broadcast_to(self.transforms, (len(T), 6, 4, 4)).copy()
+        transforms[:, self.index] = transforms[:, self.index] @ pose @ self.after
+        return transforms
 
     def configurations(self, u: Array) -> Array:
         """Return arm configurations (..., 6) [rad or m], with angles in [-pi, pi).
@@ -326,7 +332,7 @@ def arrangements(arm: Arm, offsets: Array) -> list[Arrangement]:
     length = loop_length(arm)
     G = _scale(arm.gaps, length)
     back = inverse(G)
-    ways = {1: np.array([*G[1:6], G[6]]), -1: np.array([*back[5:0:-1], back[0]])}
+    transforms = {1: np.array([*G[1:6], G[6]]), -1: np.array([*back[5:0:-1], back[0]])}
     after = {1: G[0], -1: back[6]}
     found = []
     for sign in (1, -1):
@@ -336,7 +342,7 @@ def arrangements(arm: Arm, offsets: Array) -> list[Arrangement]:
             if prismatic[5]:
                 continue
             own = np.where(prismatic, 0.0, offsets)
-            C = motion(own, prismatic=False) @ np.roll(ways[sign], -first, axis=0)
+            C = motion(own, prismatic=False) @ np.roll(transforms[sign], -first, axis=0)
             found.append(
                 Arrangement(order, sign, prismatic, own, C, 5 - first, after[sign], length)
             )
@@ -398,32 +404,33 @@ class Pencil:
         spare = min(float(rows / size) ** 12, _SPARE)
         return self.regularity * spare * (_SLIDING if self.elimination.slides else 1.0)
 
-    def matrices(self, ways: Array) -> Array:
+    def matrices(self, transforms: Array) -> Array:
         """Return parts (N, n3, n, n) of the matrix that is singular at the solutions.
 
         Args:
-            ways: (N, 6, 4, 4) constant transforms of the loop.
+            transforms: (N, 6, 4, 4) constant transforms of the loop.
         """
-        right, left = self.elimination.right_side(ways), self.elimination.left_side(ways)
+        right = self.elimination.right_side(transforms)
+        left = self.elimination.left_side(transforms)
         E = self.elimination.equations(null_rows(right, self.rank), right, left)
         M: Array = self.mix @ self.elimination.dialytic(E)
         return M
 
 
-def pencil(elimination: Elimination, ways: Array) -> Pencil:
+def pencil(elimination: Elimination, transforms: Array) -> Pencil:
     """Return the matrix construction of an elimination, with its rank and regularity.
 
     Args:
         elimination: elimination of joints 1 and 2.
-        ways: (N, 6, 4, 4) transforms of the loop at generic reachable poses.
+        transforms: (N, 6, 4, 4) transforms of the loop at generic reachable poses.
     """
-    s = np.linalg.svd(elimination.right_side(ways)[:, :, 1:], compute_uv=False)
+    s = np.linalg.svd(elimination.right_side(transforms)[:, :, 1:], compute_uv=False)
     rank = int(np.max(np.sum(s > _RANK * s[:, :1], axis=1)))
     rows, size = 2 * (len(elimination.elements) - 1 - rank), elimination.size
     if rows < size:
         return Pencil(elimination, rank, np.zeros((size, rows)), 0.0)
     found = Pencil(elimination, rank, _random_rows(size, rows), 0.0)
-    return replace(found, regularity=regularity(found.matrices(ways)))
+    return replace(found, regularity=regularity(found.matrices(transforms)))
 
 
 def regularity(M: Array) -> float:
@@ -515,7 +522,7 @@ def prepare(arm: Arm) -> Prepared:
         )
     T = _generic_poses(arm)
     tried = [
-        Prepared(loop, pencil(elimination, loop.all_ways(T)))
+        Prepared(loop, pencil(elimination, loop.transforms_for(T)))
         for loop in arrangements(arm, _TRIAL_OFFSETS)
         for elimination in eliminations(loop.prismatic)
     ]
@@ -549,7 +556,7 @@ def for_poses(prepared: Prepared, T: Array) -> list[tuple[Prepared, Numbers]]:
         left = np.flatnonzero(most <= _LEAST)
         if not len(left):
             break
-        found = _regularities(one.pencil.matrices(one.arrangement.all_ways(T[left])))
+        found = _regularities(one.pencil.matrices(one.arrangement.transforms_for(T[left])))
         better = found > most[left]
         best[left[better]], most[left[better]] = k, found[better]
     return [(every[k], np.flatnonzero(best == k)) for k in np.unique(best)]

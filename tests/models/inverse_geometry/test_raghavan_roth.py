@@ -83,7 +83,7 @@ def distinct(arm, q, tolerance=1e-5):
 
 def candidates(arm, T):
     """Configurations that may reach a pose, before they are polished and checked."""
-    return arm_core.candidates_by(arm_core.core(), general_of(arm).handed, T)
+    return arm_core.candidates_by(arm_core.core(), general_of(arm).c_loop, T)
 
 
 def candidates_many(arm, T):

@@ -30,9 +30,9 @@ def core_library() -> Any:
 
 
 def core_files(names: Iterable[str]) -> dict[str, str]:
-    """Return the text of C files and headers of the run-time library.
+    """Return the texts of C files and headers of the run-time library, by name.
 
     Args:
-        names: file names.
+        names: file names in `mbs/core/source`.
     """
     return {name: (SOURCE / name).read_text(encoding="utf-8") for name in names}

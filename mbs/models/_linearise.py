@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from mbs.arguments import names_given, values_given
 from mbs.assembly import System
+from mbs.assembly.component_instances import Quantity
 from mbs.assembly.model_function import Named, model_function, require_system
-from mbs.assembly.parts import Quantity
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.assembly.tree import position_rate
 from mbs.errors import ModelError

@@ -18,8 +18,8 @@ from casadi import DM, SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
+from mbs.assembly.component_instances import ComponentInstance
 from mbs.assembly.model_function import Named, model_function
-from mbs.assembly.parts import ComponentInstance
 from mbs.assembly.tables import EFFORT_UNIT
 from mbs.assembly.tree import position_rate, quaternion_slices
 from mbs.components.custom import Friction, OneWay, Stop

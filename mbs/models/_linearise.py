@@ -269,8 +269,7 @@ def _modes(system: System, mode: Mapping[str, float]) -> tuple[float, ...]:
     """Return the 2 k modes of the k contact rows: limits, then directions of sliding."""
     contacts = contacts_of(system)
     require_lasting_rows(system, contacts)
-    elements = (*contacts.stops, *contacts.frictions)
-    names = [element.name for element in elements if element is not None]
+    names = [element.name for _, element in contacts.elements]
     for name, value in mode.items():
         if name not in names:
             raise ModelError(
@@ -279,7 +278,10 @@ def _modes(system: System, mode: Mapping[str, float]) -> tuple[float, ...]:
             )
         if value not in (-1, 0, 1):
             raise ModelError(f"{system.name}: the mode of {name} is {value!r}; give -1, 0 or 1")
-    return tuple(float(mode.get(x.name, 0)) if x else 0.0 for x in elements)
+    modes = [0.0] * (2 * len(contacts))
+    for k, element in contacts.elements:
+        modes[k] = float(mode.get(element.name, 0))
+    return tuple(modes)
 
 
 def _words(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:

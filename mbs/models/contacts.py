@@ -163,6 +163,12 @@ class Contacts:
     def __len__(self) -> int:
         return len(self.names)
 
+    @property
+    def elements(self) -> tuple[tuple[int, ContactElement], ...]:
+        """Index (among the 2 k modes, or the 2 k efforts) of each stop, then of each friction."""
+        every = enumerate((*self.stops, *self.frictions))
+        return tuple((k, element) for k, element in every if element is not None)
+
     def at(self, q: SX, v: SX) -> ContactState:
         """Return the contact state at positions and velocities.
 

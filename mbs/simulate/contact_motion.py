@@ -121,10 +121,9 @@ def contact_columns(system: System) -> Iterator[tuple[int, str, str]]:
         system: system with k coordinates on which contacts act.
     """
     contacts = contacts_of(system)
-    for column, element in enumerate((*contacts.stops, *contacts.frictions)):
-        if element is not None:
-            yield column, f"{element.name}.mode", "1"
-            yield 2 * len(contacts) + column, f"{element.name}.effort", element.unit
+    for column, element in contacts.elements:
+        yield column, f"{element.name}.mode", "1"
+        yield 2 * len(contacts) + column, f"{element.name}.effort", element.unit
 
 
 def efforts_with_contacts(system: System, q: Array, p: Array, tau: Array, efforts: Array) -> Array:

@@ -9,7 +9,7 @@ import casadi
 from casadi import SX, Function
 
 from mbs.assembly import System
-from mbs.models.contacts import ContactEquations, Contacts
+from mbs.models.contacts import ContactEquations
 from mbs.models.symbols import dense_function
 
 Point = tuple[SX, ...]
@@ -84,16 +84,10 @@ def state_arguments(
     if contact is not None and every_mode:
         modes = contact.values
     elif contact is not None:
-        used = used_modes(contact.contacts)
+        used = [k for k, _ in contact.contacts.elements]
         modes = SX.sym("modes", len(used))
         replaced.append((contact.values, spread(modes, used, contact.values.numel())))
     return StateArguments(point, modes, every_mode, tuple(replaced))
-
-
-def used_modes(contacts: Contacts) -> list[int]:
-    """Return the indices, among the 2 k modes of k contacts, of modes with a stop or friction."""
-    elements = (*contacts.stops, *contacts.frictions)
-    return [number for number, element in enumerate(elements) if element is not None]
 
 
 def spread(values: SX, indices: Sequence[int], size: int) -> SX:

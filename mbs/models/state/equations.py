@@ -13,6 +13,7 @@ from casadi import SX
 
 from mbs.assembly import System
 from mbs.assembly.tree import Frame
+from mbs.loops.closure_equations import closure_rows
 from mbs.models._direct_dynamics import (
     direct_dynamics,
     hybrid_dynamics,
@@ -286,3 +287,9 @@ def observed(system: System, t: SX, at: EquationsOfMotion, observe: Observe | No
     motion, response = at.motion, at.response
     vectors = motion.q, motion.v, response.a, motion.v_a, response.a_a, response.every_effort
     return list(observe(OutputContext(t, system.p, *vectors, at.external)))
+
+
+def largest_closure_residual(system: System, q: SX) -> SX:
+    """Return the largest absolute closure row [m or rad], 0 without loops; q: (nq, 1) positions."""
+    rows = closure_rows(system, q) if system.is_closed else SX(0, 1)
+    return SX(casadi.mmax(casadi.fabs(rows))) if rows.numel() else SX(0)

@@ -16,7 +16,7 @@ from casadi import DM, SX, Function
 from mbs.assembly import System
 from mbs.assembly.tree import position_rate
 from mbs.models.contacts import KINDS, ContactEquations, Contacts, impact, jump
-from mbs.models.state.arguments import StateArguments, spread, used_modes
+from mbs.models.state.arguments import StateArguments, spread
 from mbs.models.state.drive import TreeMotion
 from mbs.models.symbols import outputs_of
 from mbs.numbers import NONZERO
@@ -209,7 +209,7 @@ class StateEvents:
     (t, x, z, u, p) in an FMU. The parameters are followed by the modes.
 
     Attributes:
-        modes: names of the modes, such as `stop.mode`.
+        modes: names of the modes, such as `stop.mode`; empty for a mode without stop or friction.
         names: (k) descriptions of the events of the indicators.
         first: `first(..) -> (modes, beyond)` at the start; it does not depend on the modes in p.
             beyond (k, 1) is positive if x is beyond the limit of the indicator.
@@ -243,17 +243,11 @@ class ContactEffort:
     row: int
 
 
-def element_names(contacts: Contacts) -> list[str]:
-    """Return the names of the stops, then of the frictions."""
-    elements = (*contacts.stops, *contacts.frictions)
-    return [element.name for element in elements if element is not None]
-
-
-def contact_efforts(system: System, contacts: Contacts) -> tuple[ContactEffort, ...]:
+def contact_efforts(contacts: Contacts) -> tuple[ContactEffort, ...]:
     """Return the effort outputs of the stops, then of the frictions."""
-    elements = (*contacts.stops, *contacts.frictions)
-    found = [(k, element) for k, element in enumerate(elements) if element is not None]
-    return tuple(ContactEffort(f"{element.name}.effort", element.unit, k) for k, element in found)
+    return tuple(
+        ContactEffort(f"{element.name}.effort", element.unit, k) for k, element in contacts.elements
+    )
 
 
 def contact_events(
@@ -274,31 +268,25 @@ def contact_events(
         jump: function of fired (5 k, 1), 1 for each indicator that is not positive, that returns x
             and modes (2 k, 1) after an event.
     """
-    contacts = contact.contacts
+    contacts, elements = contact.contacts, dict(contact.contacts.elements)
     watched = _watch(contacts)
     if arguments.every_mode:
         modes, names = list(range(2 * len(contacts))), dict(watched)
         watched = [(number, names.get(number, "")) for number in range(5 * len(contacts))]
     else:
-        modes = used_modes(contacts)
+        modes = list(elements)
     numbers = [number for number, _ in watched]
     fired = SX.sym("fired", len(watched))
     start, outside = contacts.first(motion.q, motion.v)
     beyond = casadi.vertcat(outside, -SX.ones(3 * len(contacts)))
     x, now = jump(spread(fired, numbers, 5 * len(contacts)))
     return StateEvents(
-        modes=tuple(f"{name}.mode" for name in _mode_names(contacts, modes)),
+        modes=tuple(f"{elements[k].name}.mode" if k in elements else "" for k in modes),
         names=tuple(name for _, name in watched),
         first=arguments.function("first", [start[modes], beyond[numbers]]),
         indicators=arguments.function("indicators", [contact.indicators[numbers]]),
         jump=arguments.function("jump", [x, now[modes]], fired),
     )
-
-
-def _mode_names(contacts: Contacts, modes: Sequence[int]) -> list[str]:
-    """Return the name of the stop or friction of each mode, empty if there is none."""
-    elements = (*contacts.stops, *contacts.frictions)
-    return ["" if (element := elements[k]) is None else element.name for k in modes]
 
 
 def join_part_events(

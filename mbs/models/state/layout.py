@@ -122,7 +122,7 @@ def minimal_layout(system: System, drive: DriveInputs) -> MinimalLayout:
         accelerations=tuple(k for k in system.active if k not in prescribed),
         passive=system.closure.passive if system.closure else (),
         efforts=(*(motors if drive.effort else ()), *prescribed),
-        contacts=contact_efforts(system, contacts_of(system)),
+        contacts=contact_efforts(contacts_of(system)),
     )
 
 

@@ -15,7 +15,6 @@ from casadi import DM, SX, Function
 
 from mbs.assembly import System
 from mbs.assembly.tree import position_rate, quaternion_slices
-from mbs.loops.closure_equations import closure_rows
 from mbs.loops.velocity import scales
 from mbs.models._energy import energy
 from mbs.models.contacts import tree_jump
@@ -29,6 +28,7 @@ from mbs.models.state.equations import (
     EquationsOfMotion,
     Observe,
     equations_of_motion,
+    largest_closure_residual,
     tree_accelerations,
 )
 from mbs.models.state.events import StateEvents, contact_events, join_part_events
@@ -285,8 +285,7 @@ def full_state(
     tree = tree_equations(system, (t, x, p), Actions(tau, driven), motions, u, every_mode=True)
     arguments, response, parts = tree.arguments, tree.at.response, tree.at.parts
     contact = response.contact
-    rows = closure_rows(system, q)
-    openness = casadi.mmax(casadi.fabs(rows)) if rows.numel() else SX(0)
+    openness = largest_closure_residual(system, q)
     E, U = outputs_of(system, energy(system, "tree"), q, v)
     contact_efforts = contact.efforts if contact else SX(0, 1)
     shown = [response.a, response.tau, u, tree.at.shown, contact_efforts, E, U, openness]

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "finite.h"
+
 /* Fraction of a squared column length below which the remaining square is summed again: four of its
  * sixteen digits are then lost by cancellation. */
 #define CANCELLED 1e-4
@@ -209,13 +211,6 @@ int shortest_solution(int m, int n, const double *A, const double *b, double gap
     if (block) solved(&w, m, n, A, b, gap, x);
     free(block);
     return !block;
-}
-
-static int all_finite(const double *a, int n) {
-    int i;
-    for (i = 0; i < n; i++)
-        if (!isfinite(a[i])) return 0;
-    return 1;
 }
 
 /* Whether every residual is at most `part` times its tolerance. */

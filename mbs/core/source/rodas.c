@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "finite.h"
+
 enum { STAGES = 8 };
 
 static const double GAMMA = 0.21193756319429014;
@@ -74,7 +76,7 @@ static int open(stepper *s, const double *x) {
     int n = s->n;
     if (s->jacobian(s->user, stepper_time(s), x, jacobian(s), time_slope(s)))
         return STEPPER_RHS_FAILED;
-    if (!stepper_all_finite(jacobian(s), n * n) || !stepper_all_finite(time_slope(s), n))
+    if (!all_finite(jacobian(s), n * n) || !all_finite(time_slope(s), n))
         return STEPPER_NOT_FINITE;
     return STEPPER_OK;
 }
@@ -141,7 +143,7 @@ static int attempt(stepper *s, const double *x, double h) {
         double *u = stage(s, k);
         const double *f = k ? stage_slope(s) : stepper_slope(s);
         for (i = 0; i < n; i++) y[i] = x[i] + combine(s, A[k], k, i);
-        if (!stepper_all_finite(y, n)) return STEPPER_NOT_FINITE;
+        if (!all_finite(y, n)) return STEPPER_NOT_FINITE;
         if (k) status = stepper_evaluate(s, t + TIME[k] * h, y, stage_slope(s));
         for (i = 0; i < n; i++)
             u[i] = f[i] + combine(s, C[k], k, i) / h + h * TIME_SLOPE[k] * time_slope(s)[i];
@@ -150,7 +152,7 @@ static int attempt(stepper *s, const double *x, double h) {
     if (status) return status;
     for (i = 0; i < n; i++) stepper_candidate(s)[i] = y[i] + stage(s, STAGES - 1)[i];
     memcpy(y, stage(s, STAGES - 1), sizeof(double) * (size_t)n);
-    return stepper_all_finite(stepper_candidate(s), n) ? STEPPER_OK : STEPPER_NOT_FINITE;
+    return all_finite(stepper_candidate(s), n) ? STEPPER_OK : STEPPER_NOT_FINITE;
 }
 
 static void keep(stepper *s, const double *x, double h) {

@@ -131,6 +131,5 @@ double *stepper_candidate(const stepper *s); /* state (n,) at the end of the att
 void stepper_close(stepper *s, const double *slope); /* store the slope, NULL if unavailable */
 /* Evaluate the right-hand side. Returns STEPPER_NOT_FINITE if an element is not finite. */
 int stepper_evaluate(const stepper *s, double t, const double *x, double *xdot);
-int stepper_all_finite(const double *v, int n);
 
 #endif

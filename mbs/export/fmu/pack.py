@@ -36,32 +36,49 @@ from mbs.view.drawing_files import icon, standalone
 
 
 _CORE = (
-    "core.c",
     "message.c",
-    "values.c",
+    "log.c",
     "inputs.c",
-    "derivatives.c",
+    "machine.c",
     "closure.c",
     "watch.c",
+    "configuration.c",
     "guard.c",
     "solver.c",
-    "switching.c",
-    "exchange.c",
+    "tree_state.c",
+    "calculated.c",
+    "internal_step.c",
+    "event_mode.c",
+    "instance.c",
+    "values.c",
+    "derivatives.c",
+    "model_exchange.c",
     "cosimulation.c",
     "saved.c",
 )
 _CORE_HEADERS = (
-    "core.h",
-    "message.h",
-    "internal.h",
     "real.h",
+    "references.h",
+    "run.h",
+    "message.h",
+    "log.h",
+    "inputs.h",
+    "machine.h",
     "closure.h",
     "watch.h",
+    "configuration.h",
     "guard.h",
-    "charts.h",
     "solver.h",
+    "tree_state.h",
+    "calculated.h",
+    "charts.h",
+    "event_data.h",
+    "internal_step.h",
+    "event_mode.h",
+    "chart_choice.h",
+    "core.h",
 )
-_HOSTED = ("charts.c",)
+_HOSTED = ("charts.c", "chart_choice.c")
 _RUNTIME = (
     "stepper",
     "events",
@@ -82,6 +99,9 @@ _RUNTIME = (
     "passage_start",
     "passage_step",
 )
+_RUNTIME_HEADERS = ("finite.h",)
+"""Headers of the run-time library that belong to no C file."""
+
 _TABLEAU = "dopri5"
 """Integrator for steps through singular configurations, independent of the solver."""
 
@@ -127,7 +147,8 @@ class FmiVersion:
         """Return the files that do not depend on the equations: dict from name to text."""
         own = resources.files("mbs.export.fmu") / "c"
         standard = resources.files("fmpy") / "c-code"
-        parts = tuple(f"{name}.{end}" for name in _runtime(solver, target) for end in "ch")
+        runtime = (f"{name}.{end}" for name in _runtime(solver, target) for end in "ch")
+        parts = (*runtime, *_RUNTIME_HEADERS)
         written = [name for name in self._own(solver, target) if name not in parts]
         heap = ("memory.h",) if _MEMORY in written else ()
         folders = (

@@ -1,9 +1,9 @@
 #include "closure.h"
 
-#include "core.h"
-
 #include <math.h>
 #include <string.h>
+
+#include "references.h"
 
 #if NZ > 0
 

@@ -1,4 +1,4 @@
-/* FMI 2.0 interface to core.c, for model exchange and co-simulation. */
+/* FMI 2.0 interface to core.h, for model exchange and co-simulation. */
 #include "fmi2_face.h"
 
 #include <math.h>
@@ -20,12 +20,12 @@ static fmi2Status as_fmi(core_status status) {
 static void forward_log(void *host, const char *name, core_status status, const char *message) {
     face *f = host;
     if (f->logger)
-        f->logger(f->environment, name, as_fmi(status), core_category(status), "%s", message);
+        f->logger(f->environment, name, as_fmi(status), log_category(status), "%s", message);
 }
 
 static fmi2Status refused(fmi2Component c, const char *message) {
     NEED(c);
-    return as_fmi(core_refuse(MODEL(c), "%s: %s", MODEL(c)->name, message));
+    return as_fmi(log_error(&MODEL(c)->log, "%s", message));
 }
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
@@ -100,7 +100,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
         fmi2FreeInstance(f);
         return no_instance(functions, name, "no memory is left");
     }
-    f->model.discards = logging != fmi2False;
+    f->model.log.discards = logging != fmi2False;
     return f;
 }
 
@@ -113,7 +113,7 @@ void fmi2FreeInstance(fmi2Component c) {
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
                                const fmi2String categories[]) {
     NEED(c);
-    return as_fmi(core_set_logging(MODEL(c), on, categories, n));
+    return as_fmi(log_select(&MODEL(c)->log, on, categories, n));
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance,
@@ -307,7 +307,7 @@ static fmi2Status no_status(fmi2Component c) {
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
     NEED(c);
     if (kind != fmi2LastSuccessfulTime || !value) return no_status(c);
-    *value = MODEL(c)->m.time;
+    *value = MODEL(c)->m.run.time;
     return fmi2OK;
 }
 

@@ -1,4 +1,4 @@
-/* FMI 3.0 interface to core.c, part 1: instances and values, model exchange and co-simulation. */
+/* FMI 3.0 interface to core.h, part 1: instances and values, model exchange and co-simulation. */
 #include <math.h>
 #include <string.h>
 
@@ -8,14 +8,14 @@
 static void forward_log(void *host, const char *name, core_status status, const char *message) {
     face *f = host;
     (void)name;
-    if (f->logger) f->logger(f->environment, as_fmi(status), core_category(status), message);
+    if (f->logger) f->logger(f->environment, as_fmi(status), log_category(status), message);
 }
 
 const char *fmi3GetVersion(void) { return fmi3Version; }
 
 static void *no_instance(fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
                          const char *message) {
-    if (logger) logger(environment, fmi3Error, core_category(CORE_ERROR), message);
+    if (logger) logger(environment, fmi3Error, log_category(CORE_ERROR), message);
     return NULL;
 }
 
@@ -48,8 +48,8 @@ static face *instantiate(fmi3String name, fmi3String token, int cosimulation, fm
         fmi3FreeInstance(f);
         return no_instance(environment, logger, "no memory is left");
     }
-    f->model.discards = logging;
-    f->model.timed = 1;
+    f->model.log.discards = logging;
+    f->model.host.timed = 1;
     return f;
 }
 
@@ -86,9 +86,9 @@ fmi3Instance fmi3InstantiateCoSimulation(
     f = instantiate(name, token, 1, logging, environment, logger);
     if (!f) return NULL;
     f->update = update;
-    f->model.watch = update ? report : NULL;
-    f->model.event_mode = event_mode;
-    f->model.early_return = early_return;
+    f->model.host.watch = update ? report : NULL;
+    f->model.host.event_mode = event_mode;
+    f->model.host.early_return = early_return;
     return f;
 }
 
@@ -112,7 +112,7 @@ void fmi3FreeInstance(fmi3Instance c) {
 fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n,
                                const fmi3String categories[]) {
     NEED(c);
-    return as_fmi(core_set_logging(MODEL(c), on, categories, n));
+    return as_fmi(log_select(&MODEL(c)->log, on, categories, n));
 }
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_defined,
@@ -147,7 +147,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     for (i = 0; i <= e.n && !status; i++) {
         if (i < e.n && e.ref[i] != TIME_REFERENCE) continue;
         status = as_fmi(core_get(MODEL(c), e.ref + first, i - first, value + first));
-        if (i < e.n && !status) value[i] = MODEL(c)->m.time;
+        if (i < e.n && !status) value[i] = MODEL(c)->m.run.time;
         first = i + 1;
     }
     elements_end(c, &e);

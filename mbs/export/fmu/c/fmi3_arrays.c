@@ -19,7 +19,7 @@ static int spread(fmi3Instance c, elements *e, const fmi3ValueReference vr[], si
             refused(c, "a value reference is that of an element of an array; use that of the array");
             return 0;
         }
-    e->own = MODEL(c)->supply.take(c, (count + 1) * (sizeof *ref + sizeof *of_order));
+    e->own = MODEL(c)->host.supply.take(c, (count + 1) * (sizeof *ref + sizeof *of_order));
     if (!e->own) {
         refused(c, "no memory is left for the elements of the variables");
         return 0;
@@ -55,6 +55,6 @@ int elements_begin(fmi3Instance c, elements *e, const fmi3ValueReference vr[], s
 }
 
 void elements_end(fmi3Instance c, elements *e) {
-    if (e->own) MODEL(c)->supply.drop(c, e->own);
+    if (e->own) MODEL(c)->host.supply.drop(c, e->own);
     e->own = NULL;
 }

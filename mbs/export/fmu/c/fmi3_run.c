@@ -141,7 +141,7 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 h, fmi3Boole
     status = core_do_step(MODEL(c), time, h, &stop);
     *event = stop.event != 0;
     *early = stop.early != 0;
-    *last = MODEL(c)->m.time;
+    *last = MODEL(c)->m.run.time;
     return as_fmi(status);
 }
 

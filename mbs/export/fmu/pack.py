@@ -59,25 +59,28 @@ _CORE = (
 _CORE_HEADERS = (
     "real.h",
     "references.h",
+    "closure.h",
+    "watch.h",
     "run.h",
     "message.h",
     "log.h",
     "inputs.h",
     "machine.h",
-    "closure.h",
-    "watch.h",
     "configuration.h",
     "guard.h",
     "solver.h",
     "tree_state.h",
-    "calculated.h",
     "charts.h",
+    "calculated.h",
     "event_data.h",
     "internal_step.h",
     "event_mode.h",
     "chart_choice.h",
     "core.h",
 )
+"""Headers from the lowest part to the highest: a file includes only its own header and headers
+before it."""
+
 _HOSTED = ("charts.c", "chart_choice.c")
 _RUNTIME = (
     "stepper",

@@ -28,8 +28,8 @@ static core_status check_values(machine *m) {
 /* The same check if the joint coordinates are the states for the external integrator. */
 static core_status check_joint_values(machine *m) {
     double *v = m->values;
-    memcpy(v + SLOTS, v + STATES, NS * sizeof *v);
-    memcpy(v + RATES, v + DERIVATIVES, NS * sizeof *v);
+    memcpy(v + CHART_STATES, v + STATES, NS * sizeof *v);
+    memcpy(v + CHART_RATES, v + DERIVATIVES, NS * sizeof *v);
     return check_values(m);
 }
 

@@ -33,19 +33,19 @@ static double room(core_solver *s) {
  * room exceeds `least`, else tangent coordinates. */
 static core_status choose(core_solver *s, double least) {
     machine *m = s->machine;
-    double *slots = m->values + SLOTS, t = m->run->time;
+    double *states = m->values + CHART_STATES, t = m->run->time;
     int i;
     m->variables->stale = 1;
     s->charts->settled = 1;
     s->charts->tangent = !(room(s) > least);
     if (!s->charts->tangent) {
-        for (i = 0; i < NX; i++) slots[i] = s->tree->X[MODEL_TREE_STATES[i]];
+        for (i = 0; i < NX; i++) states[i] = s->tree->X[MODEL_TREE_STATES[i]];
         return CORE_OK;
     }
-    memset(slots, 0, NX * sizeof *slots);
+    memset(states, 0, NX * sizeof *states);
     s->charts->alignment = 1.0;
     if (!passage_chart(s->passage, t, s->tree->X) &&
-        !passage_coordinates(s->passage, t, s->tree->X, slots))
+        !passage_coordinates(s->passage, t, s->tree->X, states))
         return CORE_OK;
     return log_failed(m->log,
                       "at time %.9g the motion is in a singular configuration (%s), and its "
@@ -106,7 +106,7 @@ core_status chart_choice_show_indicator(core_solver *s) {
     shown = indicator(s);
     if (shown > 0.0) status = accept_states(s);
     if (status) return status;
-    s->machine->values[CHART] = shown == 0.0 ? -DBL_MIN : shown;
+    s->machine->values[CHART_INDICATOR] = shown == 0.0 ? -DBL_MIN : shown;
     return CORE_OK;
 }
 
@@ -147,7 +147,7 @@ static core_status jump_from_chart(core_events *e, int *jumped) {
 
 core_status chart_choice_update(core_events *e, int *changed) {
     core_solver *s = e->solver;
-    const double *slots = s->machine->values + SLOTS;
+    const double *states = s->machine->values + CHART_STATES;
     double before[NX + 1];
     core_status status;
     int jumped;
@@ -159,12 +159,12 @@ core_status chart_choice_update(core_events *e, int *changed) {
     status = jump_from_chart(e, &jumped);
     *changed = *changed || jumped;
     if (status || s->charts->settled) return status;
-    memcpy(before, slots, sizeof before);
+    memcpy(before, states, sizeof before);
     status = calculate(s);
     if (status) return status;
     charts_accept(s);
     status = choose(s, s->charts->tangent ? LEAVE : 1.0 + NEAR);
-    *changed = memcmp(before, slots, NX * sizeof *before) != 0;
+    *changed = memcmp(before, states, NX * sizeof *before) != 0;
     return status;
 }
 

@@ -87,7 +87,7 @@ static int by_chart(core_solver *s, const double *y, chart_values *f) {
 
 /* Evaluate the model at the states. Nonzero on failure. */
 static int at_states(core_solver *s, chart_values *f) {
-    const double *x = s->machine->values + SLOTS;
+    const double *x = s->machine->values + CHART_STATES;
     return (s->charts->tangent ? by_chart(s, x, f) : by_joints(s, x, f)) ||
            !all_finite(f->slope, NT);
 }
@@ -106,7 +106,7 @@ core_status charts_calculate(core_solver *s) {
     memcpy(s->tree->X, f.X, sizeof f.X);
     memcpy(s->tree->slope, f.slope, sizeof f.slope);
     memcpy(v + OUTPUTS, f.y, NY * sizeof *v);
-    memcpy(v + RATES, f.rate, NX * sizeof *v);
+    memcpy(v + CHART_RATES, f.rate, NX * sizeof *v);
     for (i = 0; i < NX; i++) v[STATES + i] = f.X[MODEL_TREE_STATES[i]];
     for (i = 0; i < NX; i++) v[DERIVATIVES + i] = f.slope[MODEL_TREE_STATES[i]];
     for (i = 0; i < NZ; i++) v[DEPENDENTS + i] = f.X[MODEL_TREE_DEPENDENTS[i]];
@@ -126,7 +126,7 @@ void charts_accept(core_solver *s) {
 void charts_show_joints(core_solver *s) {
     double *v = s->machine->values;
     int i;
-    for (i = 0; i < NX; i++) v[SLOTS + i] = v[STATES + i];
+    for (i = 0; i < NX; i++) v[CHART_STATES + i] = v[STATES + i];
 }
 
 /* Evaluate the model at a point displaced by `part` times the direction `along`. ahead (NT,):
@@ -140,7 +140,7 @@ static int displaced(core_solver *s, const charts_tangent *along, const double *
     core_solver_memory memory = *s->memory;
     int i, status;
     m->run->time += part * along->dt;
-    for (i = 0; i < NX; i++) y[i] = v[SLOTS + i] + part * along->dx[i];
+    for (i = 0; i < NX; i++) y[i] = v[CHART_STATES + i] + part * along->dx[i];
     for (i = 0; i < NU; i++) v[INPUTS + i] += part * along->du[i];
     for (i = 0; i < NP; i++) v[PARAMETERS + i] += part * along->dp[i];
     for (i = 0; i < NT; i++) guide[i] = s->tree->X[i] + part * ahead[i];

@@ -164,8 +164,10 @@ static int from_start(const loops *l, const real *x, real *z) {
     return newton(l, x, z, UNBOUNDED);
 }
 
+/* Whether dependent coordinate i has a guess. */
 static int guessed(const loops *l, int i) { return l->guess[i] != MODEL_START[DEPENDENTS + i]; }
 
+/* Whether a dependent coordinate has a guess. */
 static int any_guessed(const loops *l) {
     int i;
     for (i = 0; i < NZ; i++)

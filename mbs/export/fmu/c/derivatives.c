@@ -9,7 +9,7 @@
 /* Seeds, or derivatives, of time, states, inputs, parameters and all calculated values. */
 typedef struct {
     double dt, dx[NX + 1], du[NU + 1], dp[NP + 1];
-    double dslot[NX + 1], drate[NX + 1]; /* states of the external integrator, their rates */
+    double dchart[NX + 1], drate[NX + 1]; /* states of the external integrator, their rates */
     double dxdot[NX + 1], dy[NY + 1], dm[NM + 1], dz[NZ + 1], dg[NK + 1];
 } tangents;
 
@@ -32,8 +32,8 @@ static double *known_of(const core *c, tangents *d, core_reference ref) {
     if (ref < OUTPUTS) return d->du + (ref - INPUTS);
     if (ref < PARAMETERS) return NULL;
     if (ref < MODES) return d->dp + (ref - PARAMETERS);
-    if (ref < SLOTS) return NULL;
-    return ref < RATES ? d->dslot + (ref - SLOTS) : NULL;
+    if (ref < CHART_STATES) return NULL;
+    return ref < CHART_RATES ? d->dchart + (ref - CHART_STATES) : NULL;
 }
 
 /* Address of the derivative of a value reference, or NULL if it has none. */
@@ -45,9 +45,9 @@ static double *unknown_of(tangents *d, core_reference ref) {
     if (ref < MODES) return NULL;
     if (ref < DEPENDENTS) return d->dm + (ref - MODES); /* constant */
     if (ref < INDICATORS) return d->dz + (ref - DEPENDENTS);
-    if (ref < SLOTS) return d->dg + (ref - INDICATORS);
-    if (ref < RATES) return d->dslot + (ref - SLOTS);
-    return ref < CHART ? d->drate + (ref - RATES) : NULL;
+    if (ref < CHART_STATES) return d->dg + (ref - INDICATORS);
+    if (ref < CHART_RATES) return d->dchart + (ref - CHART_STATES);
+    return ref < CHART_INDICATOR ? d->drate + (ref - CHART_RATES) : NULL;
 }
 
 /* Compute the directional derivatives of all calculated values along the seeds in d, at the point
@@ -194,7 +194,7 @@ static core_status move_in_chart(core_solver *s, tangents *d) {
     core_status status;
     memset(&along, 0, sizeof along);
     along.dt = d->dt;
-    memcpy(along.dx, d->dslot, sizeof d->dslot);
+    memcpy(along.dx, d->dchart, sizeof d->dchart);
     memcpy(along.du, d->du, sizeof d->du);
     memcpy(along.dp, d->dp, sizeof d->dp);
     status = charts_difference(s, &along);
@@ -215,7 +215,7 @@ static core_status move(core_solver *s, tangents *d) {
 #if MODEL_TREE_OUTSIDE
     if (in_chart(s)) return move_in_chart(s, d);
 #endif
-    for (i = 0; i < NX; i++) d->dx[i] += d->dslot[i];
+    for (i = 0; i < NX; i++) d->dx[i] += d->dchart[i];
     present_point(m);
     if (directional(m, d)) return log_failed(m->log, "no derivative at time %.9g", m->run->time);
     memcpy(d->drate, d->dxdot, sizeof d->drate);
@@ -273,7 +273,7 @@ core_status core_adjoint(core *c, const core_reference *unknown, size_t n_unknow
     memset(&w, 0, sizeof w);
     for (i = 0; i < n_unknown; i++) *unknown_of(&w, unknown[i]) += seed[i];
     for (i = 0; i < NX; i++) {
-        w.dx[i] += w.dslot[i];
+        w.dx[i] += w.dchart[i];
         w.dxdot[i] += w.drate[i];
     }
     present_point(m);
@@ -288,7 +288,7 @@ core_status core_adjoint(core *c, const core_reference *unknown, size_t n_unknow
     if (machine_call(m, mbs_adjoint))
         return log_failed(m->log, "no derivative at time %.9g", m->run->time);
     for (i = 0; i < NX; i++) g.dx[i] += w.dx[i]; /* a state may be an output */
-    memcpy(g.dslot, g.dx, sizeof g.dslot);
+    memcpy(g.dchart, g.dx, sizeof g.dchart);
     for (i = 0; i < n_known && !status; i++) {
         answer[i] = *known_of(c, &g, known[i]);
         status = finite_answer(&c->log, known[i], answer[i]);

@@ -95,21 +95,21 @@ static int counted(core_log *l, const void *array, size_t n, int count, const ch
 }
 
 core_status core_set_states(core *c, const double *x, size_t n) {
-    double *states = c->m.variables.values + OUTSIDE;
+    double *states = c->m.variables.values + CONTINUOUS_STATES;
     size_t i;
     if (!log_allowed(&c->log, CONTINUOUS, "setting the states") ||
         !counted(&c->log, x, n, NX, "states"))
         return CORE_ERROR;
     for (i = 0; i < n; i++)
         if (!isfinite(x[i]))
-            return log_error(&c->log, "%s = %g is not finite", MODEL_NAMES[OUTSIDE + i], x[i]);
+            return log_error(&c->log, "%s = %g is not finite", MODEL_NAMES[CONTINUOUS_STATES + i], x[i]);
     if (memcmp(states, x, n * sizeof *x)) c->m.variables.stale = 1;
     memcpy(states, x, n * sizeof *x);
     return CORE_OK;
 }
 
 core_status core_get_states(core *c, double *x, size_t n) {
-    int first = c->m.run.mode == INITIALIZATION ? (int)STATES : (int)OUTSIDE;
+    int first = c->m.run.mode == INITIALIZATION ? (int)STATES : (int)CONTINUOUS_STATES;
     if (!log_allowed(&c->log, NOT_STEPPING, "getting the states") ||
         !counted(&c->log, x, n, NX, "states"))
         return CORE_ERROR;
@@ -123,7 +123,7 @@ core_status core_get_derivatives(core *c, double *xdot, size_t n) {
         !counted(&c->log, xdot, n, NX, "states"))
         return CORE_ERROR;
     status = calculate(&c->solver);
-    memcpy(xdot, c->m.variables.values + OUTSIDE_RATES, n * sizeof *xdot);
+    memcpy(xdot, c->m.variables.values + CONTINUOUS_DERIVATIVES, n * sizeof *xdot);
     return status;
 }
 
@@ -142,7 +142,7 @@ core_status core_get_indicators(core *c, double *indicators, size_t n) {
     status = event_mode_show_indicators(&c->events);
 #if MODEL_TREE_OUTSIDE
     if (!status) status = chart_choice_show_indicator(&c->solver);
-    indicators[NK] = v[CHART];
+    indicators[NK] = v[CHART_INDICATOR];
 #endif
     memcpy(indicators, v + INDICATORS, NK * sizeof *indicators);
     return status;

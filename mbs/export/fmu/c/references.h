@@ -20,18 +20,18 @@ enum {
     MODES = PARAMETERS + NP,
     DEPENDENTS = MODES + NM,
     INDICATORS = DEPENDENTS + NZ,
-    SLOTS = INDICATORS + NK, /* continuous states of closed loops in model exchange (charts.h) */
-    RATES = SLOTS + NS,      /* derivatives of these states */
-    CHART = RATES + NS,      /* event indicator of a change of their coordinates */
-    N_VALUES = CHART + NC,
+    CHART_STATES = INDICATORS + NK, /* continuous states of closed loops in model exchange (charts.h) */
+    CHART_RATES = CHART_STATES + NS,      /* derivatives of these states */
+    CHART_INDICATOR = CHART_RATES + NS,      /* event indicator of a change of their coordinates */
+    N_VALUES = CHART_INDICATOR + NC,
     TIME_REFERENCE = N_VALUES /* the independent variable time, a variable in FMI 3.0 only */
 };
 
 /* First references of the continuous states of model exchange and of their derivatives. */
 #if MODEL_TREE_OUTSIDE
-enum { OUTSIDE = SLOTS, OUTSIDE_RATES = RATES };
+enum { CONTINUOUS_STATES = CHART_STATES, CONTINUOUS_DERIVATIVES = CHART_RATES };
 #else
-enum { OUTSIDE = STATES, OUTSIDE_RATES = DERIVATIVES };
+enum { CONTINUOUS_STATES = STATES, CONTINUOUS_DERIVATIVES = DERIVATIVES };
 #endif
 
 /* Number of integrated coordinates: those of all joints of the tree if the model has closed loops

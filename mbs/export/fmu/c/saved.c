@@ -106,6 +106,7 @@ static int possible_run(const core_run *r) {
     }
 }
 
+/* Whether the parameters in v (N_VALUES,) are within their bounds. */
 static int parameters_in_bounds(const double *v) {
     int i;
     for (i = PARAMETERS; i < MODES; i++)
@@ -113,6 +114,8 @@ static int parameters_in_bounds(const double *v) {
     return 1;
 }
 
+/* Whether the functions of an instance could have written the data of a part: its flags and finite
+ * numbers. One function for each part of core_memory. */
 static int possible_variables(const core_variables *m) {
     const double *v = m->values;
     if (!is_flag(m->stale)) return 0;
@@ -123,7 +126,7 @@ static int possible_variables(const core_variables *m) {
     if (!all_finite(m->speeds, N_PASSIVE)) return 0;
 #endif
 #if MODEL_TREE_OUTSIDE
-    if (!all_finite(v + SLOTS, NX)) return 0;
+    if (!all_finite(v + CHART_STATES, NX)) return 0;
 #endif
     return all_finite(m->guess, NZ);
 }

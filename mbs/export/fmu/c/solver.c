@@ -14,6 +14,7 @@ static int states_rhs(void *user, double t, const double *x, double *xdot) {
 }
 
 #if defined MODEL_RODAS && !defined MODEL_TREE
+/* d xdot / d x (NX, NX), column by column, and d xdot / d t (NX,). */
 static int states_jacobian(void *user, double t, const double *x, double *J, double *f_t) {
     machine *m = ((core_solver *)user)->machine;
     double du[NU + 1];
@@ -56,6 +57,7 @@ int solver_project_tree(core_solver *s, double t, double *X) {
     return projection_converge(NT, tree_project_once, s, t, X, projected);
 }
 
+/* Projection onto the rows, as callback of the integrator. */
 static int tree_project(void *user, double t, double *X) {
     return solver_project_tree((core_solver *)user, t, X);
 }
@@ -88,6 +90,7 @@ static int tree_regularity(void *user, double t, const double *X, double *value)
 }
 
 #ifdef MODEL_RODAS
+/* d Xdot / d X (NT, NT), column by column, and d Xdot / d t (NT,). */
 static int tree_jacobian(void *user, double t, const double *X, double *J, double *f_t) {
     machine *m = ((core_solver *)user)->machine;
     double du[NU + 1];

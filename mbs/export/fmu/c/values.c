@@ -30,15 +30,15 @@ static int is_mode(core_reference ref) { return among(ref, MODES, DEPENDENTS); }
 static int given(int mode, core_reference ref) {
     if (ref < DERIVATIVES) return !NS || (mode & STARTING) != 0;
     if (among(ref, INPUTS, OUTPUTS)) return 1;
-    if (among(ref, SLOTS, RATES)) return !(mode & STARTING);
+    if (among(ref, CHART_STATES, CHART_RATES)) return !(mode & STARTING);
     return ref >= PARAMETERS && ref < (mode == INITIALIZATION ? MODES : DEPENDENTS);
 }
 
 /* Calculate the value of a reference, if it is not given. */
 static core_status update(core *c, core_reference ref) {
-    if (among(ref, INDICATORS, SLOTS)) return event_mode_show_indicators(&c->events);
+    if (among(ref, INDICATORS, CHART_STATES)) return event_mode_show_indicators(&c->events);
 #if MODEL_TREE_OUTSIDE
-    if (ref == CHART && !c->m.run.cosimulation) return chart_choice_show_indicator(&c->solver);
+    if (ref == CHART_INDICATOR && !c->m.run.cosimulation) return chart_choice_show_indicator(&c->solver);
 #endif
     return given(c->m.run.mode, ref) ? CORE_OK : calculate(&c->solver);
 }
@@ -98,7 +98,7 @@ static int is_speed(unsigned ref) {
 /* Modes in which a variable may be set, 0 for a calculated variable. */
 static int settable(int cosimulation, core_reference ref) {
     if (ref < DERIVATIVES && NS) return cosimulation ? STARTING : STARTING | EVENT;
-    if (ref < DERIVATIVES || among(ref, SLOTS, RATES))
+    if (ref < DERIVATIVES || among(ref, CHART_STATES, CHART_RATES))
         return cosimulation ? STARTING : STARTING | EVENT | CONTINUOUS;
     if (ref < INPUTS) return 0;
     if (ref < OUTPUTS) return STARTING | RUNNING;
@@ -169,9 +169,9 @@ static void set_speed(core *c, unsigned ref, double value) {
 
 /* Set a state of an independent joint by its reference for external integrators. Before the start,
  * a value equal to that in the model description has no effect. */
-static void set_slot(core *c, core_reference ref, double value) {
+static void set_chart_state(core *c, core_reference ref, double value) {
     int before = (c->m.run.mode & STARTING) != 0;
-    double *at = c->m.variables.values + (before ? ref - SLOTS + STATES : ref);
+    double *at = c->m.variables.values + (before ? ref - CHART_STATES + STATES : ref);
     if (*at == value || (before && value == MODEL_START[ref])) return;
     *at = value;
     changed(c);
@@ -195,8 +195,8 @@ core_status core_set(core *c, const core_reference *ref, size_t n, const double 
     for (i = 0; i < n; i++)
         if (settable_value(&c->log, ref[i], values[i])) return CORE_ERROR;
     for (i = 0; i < n; i++) {
-        if (ref[i] >= SLOTS) {
-            set_slot(c, ref[i], values[i]);
+        if (ref[i] >= CHART_STATES) {
+            set_chart_state(c, ref[i], values[i]);
         } else if (ref[i] >= DEPENDENTS) {
             set_guess(c, ref[i], values[i]);
         } else if (is_speed(ref[i])) {
@@ -204,7 +204,7 @@ core_status core_set(core *c, const core_reference *ref, size_t n, const double 
         } else if (v[ref[i]] != values[i]) {
             if (joints_set(c, ref[i])) return CORE_ERROR;
             v[ref[i]] = values[i];
-            if (among(ref[i], STATES, STATES + NS)) v[SLOTS + ref[i]] = values[i];
+            if (among(ref[i], STATES, STATES + NS)) v[CHART_STATES + ref[i]] = values[i];
             changed(c);
         }
     }

@@ -457,6 +457,11 @@ def _library_in(
         return _install(library, folder / f"{key}-{_sum_of(library)}{suffix}")
 
 
+_COMPILERS = 8
+"""Largest number of compilers at the same time. Each takes about 0.1 GB. A long file is a third of
+the work for an FMU, so that more compilers would be no faster."""
+
+
 def _objects(
     parts: Sequence[str],
     files: Mapping[str, str],
@@ -465,7 +470,7 @@ def _objects(
     build: Path,
     common: Collection[str],
 ) -> list[Path]:
-    """Return the object files of C files in the build folder, compiled on all processors.
+    """Return the object files of C files in the build folder, compiled at the same time.
 
     A single file is returned itself: it is compiled and linked in one call.
     """
@@ -477,7 +482,7 @@ def _objects(
             return _common_object(file, files, flags, compiler, build)
         return _object(build / file, _object_flags(flags), compiler)
 
-    with ThreadPoolExecutor(os.cpu_count()) as workers:
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, _COMPILERS)) as workers:
         longest_first = sorted(parts, key=lambda file: file in common)
         found = {file: workers.submit(compiled, file) for file in longest_first}
         try:

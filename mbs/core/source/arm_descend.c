@@ -15,8 +15,9 @@ static const double ZERO = 2e-6;       /* damping along self-motions, accurate t
                                           1e-12 */
 static const double LONGEST = 0.3;     /* longest step of the linear range [rad or arm lengths] */
 static const double DEPENDENT_THERE = 1e-10; /* DEPENDENT on a sphere, where motions meet */
-static const double STRAIGHT = 0.9;    /* cosine of 26 degrees, largest change of direction in a
-                                          step: curves hardly ever cross at smaller angles */
+/* cosine of 26 degrees, largest change of direction in a step: curves hardly ever cross at smaller
+ * angles */
+static const double STRAIGHT = 0.9;
 static const double FINISHED = 1e-14;  /* step [rad or arm lengths] that is rounding */
 static const double SETTLED = 1e-12;   /* step [rad or arm lengths] slightly above rounding */
 

@@ -7,15 +7,21 @@
 
 void machine_init(machine *m, core_run *run, core_log *log, core_variables *variables,
                   core_inputs *inputs, core_configuration *accepted) {
-    loops l = {accepted->x, accepted->z, variables->guess, variables->values + PARAMETERS,
-               m->arg,      m->res,      m->iw,            m->w};
+    loops *l = &m->loops;
     m->run = run;
     m->log = log;
     m->variables = variables;
     m->values = variables->values;
     m->inputs = inputs;
     m->accepted = accepted;
-    m->loops = l;
+    l->x = accepted->x;
+    l->z = accepted->z;
+    l->guess = variables->guess;
+    l->p = variables->values + PARAMETERS;
+    l->arg = m->arg;
+    l->res = m->res;
+    l->iw = m->iw;
+    l->w = m->w;
 }
 
 void machine_reset(machine *m) {

@@ -17,6 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Collection, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -470,18 +471,49 @@ def _library_in(
         build = Path(name)
         for file, text in files.items():
             (build / file).write_text(text, encoding="utf-8")
-        parts = [
-            _common_object(file, files, flags, compiler, build) if file in common else build / file
-            for file in files
-            if file.endswith(".c") and file not in together
-        ]
+        parts = [file for file in files if file.endswith(".c") and file not in together]
         if together:
-            parts.append(build / _TOGETHER)
+            parts.append(_TOGETHER)
             lines = (f'#include "{file}"\n' for file in together)
-            parts[-1].write_text("".join(lines), encoding="utf-8")
+            (build / _TOGETHER).write_text("".join(lines), encoding="utf-8")
+        objects = _objects(parts, files, flags, compiler, build, common)
         output = build / f"library{suffix}"
-        library = compile_library(parts, [build], flags, output, compiler=compiler)
+        library = compile_library(objects, [build], flags, output, compiler=compiler)
         return _install(library, folder / f"{key}-{_checksum(library)}{suffix}")
+
+
+_COMPILERS = 8
+"""Largest number of compilers at the same time. Each takes about 0.1 GB. A long file is a third of
+the work for an FMU, so that more compilers would be no faster."""
+
+
+def _objects(
+    parts: Sequence[str],
+    files: Mapping[str, str],
+    flags: Sequence[str],
+    compiler: Compiler,
+    build: Path,
+    common: Collection[str],
+) -> list[Path]:
+    """Return the object files of C files in the build folder, compiled at the same time.
+
+    A single file is returned itself: it is compiled and linked in one call.
+    """
+    if len(parts) == 1 and parts[0] not in common:
+        return [build / parts[0]]
+
+    def compiled(file: str) -> Path:
+        if file in common:
+            return _common_object(file, files, flags, compiler, build)
+        return _object(build / file, _object_flags(flags), compiler)
+
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, _COMPILERS)) as workers:
+        longest_first = sorted(parts, key=lambda file: file in common)
+        found = {file: workers.submit(compiled, file) for file in longest_first}
+        try:
+            return [found[file].result() for file in parts]
+        finally:
+            workers.shutdown(cancel_futures=True)
 
 
 def _undamaged_file(folder: Path, key: str, suffix: str) -> Path | None:
@@ -503,14 +535,24 @@ def _common_object(
     read = [file]
     for name in read:  # the list grows: headers may include headers
         read += [n for n in _INCLUDE.findall(files[name]) if n in files and n not in read]
-    chosen = [*(flag for flag in flags if flag not in ("-shared", "-s")), "-c"]
+    chosen = _object_flags(flags)
     key, folder = _key({name: files[name] for name in read}, chosen, compiler), build.parent
     known = _undamaged_file(folder, key, ".o")
     if known is not None:
         return known
-    source, output = build / file, build / f"{Path(file).stem}.o"
-    _compile(compiler, [*chosen, f"-I{build}", str(source), "-o", str(output)], [source])
+    output = _object(build / file, chosen, compiler)
     return _install(output, folder / f"{key}-{_checksum(output)}.o")
+
+
+def _object_flags(flags: Sequence[str]) -> list[str]:
+    return [*(flag for flag in flags if flag not in ("-shared", "-s")), "-c"]
+
+
+def _object(source: Path, flags: Sequence[str], compiler: Compiler) -> Path:
+    """Compile a C file, with headers in its folder, to an object file beside it."""
+    output = source.with_suffix(".o")
+    _compile(compiler, [*flags, f"-I{source.parent}", str(source), "-o", str(output)], [source])
+    return output
 
 
 def is_whole(library: Path) -> bool:

@@ -102,9 +102,6 @@ _RUNTIME = (
     "passage_start",
     "passage_step",
 )
-_RUNTIME_HEADERS = ("finite.h",)
-"""Headers of the run-time library that belong to no C file."""
-
 _TABLEAU = "dopri5"
 """Integrator for steps through singular configurations, independent of the solver."""
 
@@ -150,8 +147,7 @@ class FmiVersion:
         """Return the files that do not depend on the equations: dict from name to text."""
         own = resources.files("mbs.export.fmu") / "c"
         standard = resources.files("fmpy") / "c-code"
-        runtime = (f"{name}.{end}" for name in _runtime(solver, target) for end in "ch")
-        parts = (*runtime, *_RUNTIME_HEADERS)
+        parts = tuple(f"{name}.{end}" for name in _runtime(solver, target) for end in "ch")
         written = [name for name in self._own(solver, target) if name not in parts]
         heap = ("memory.h",) if _MEMORY in written else ()
         folders = (

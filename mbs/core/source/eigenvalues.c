@@ -140,8 +140,8 @@ static int step_start(int n, const double *H, int first, int last, const shifts 
         double left, right;
         first_column(n, H, m, s, v);
         left = fabs(H[m * n + m - 1]) * (fabs(v[1]) + fabs(v[2]));
-        right = fabs(v[0]) * (fabs(H[(m - 1) * n + m - 1]) + fabs(H[m * n + m]) +
-                              fabs(H[(m + 1) * n + m + 1]));
+        right = fabs(v[0]) *
+                (fabs(H[(m - 1) * n + m - 1]) + fabs(H[m * n + m]) + fabs(H[(m + 1) * n + m + 1]));
         if (left < DBL_EPSILON * right) break;
     }
     return m;

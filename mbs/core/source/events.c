@@ -362,8 +362,8 @@ static int first_event(events *e, const double *x, double start, double *event, 
         double next = number < LOOKS ? start + number * (end - start) / LOOKS : end;
         double to = near ? fmin(next, from + time_to_next(e)) : next;
         if (to <= from) to = next; /* the increment is below the rounding of time */
-        status = from > start ? look(e, x, to, right(e), right_rate(e))
-                              : first_look(e, x, start, &to);
+        status =
+            from > start ? look(e, x, to, right(e), right_rate(e)) : first_look(e, x, start, &to);
         if (near && !status) {
             status = come_near(e, x, from, &to);
             if (!status && !follows(e, start, to)) {

@@ -9,7 +9,7 @@
 /* Residual, relative to the largest state or 1: above rounding, and below the residual before the
  * last step, 1e-8. */
 #define TOLERANCE 1e-12
-#define STEPS 10        /* maximum Newton steps: each squares the error, more do not help */
+#define STEPS 10 /* maximum Newton steps: each squares the error, more do not help */
 
 int projection_converge(int n, projection_step step, void *user, double t, double *x,
                         double *after) {

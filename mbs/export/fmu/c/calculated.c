@@ -83,8 +83,8 @@ core_status calculate(core_solver *s) {
 #ifdef MODEL_TREE
     if (solver_has_tree(s) && !(m->run->mode & STARTING)) return on_tree(s);
 #endif
-    status = m->accepted->known ? closure_solve(&m->loops, x, m->z)
-                                : closure_start(&m->loops, x, m->z);
+    status =
+        m->accepted->known ? closure_solve(&m->loops, x, m->z) : closure_start(&m->loops, x, m->z);
 #ifdef MODEL_TREE
     s->tree->singular = 0;
     if (solver_has_tree(s) &&

@@ -98,11 +98,12 @@ core_status charts_calculate(core_solver *s) {
     chart_values f;
     int i;
     if (at_states(s, &f))
-        return log_failed(m->log,
-                          "at time %.9g the loops have no solution near the last one (%s), or "
-                          "are in a singular configuration that the motion does not pass; ask for a "
-                          "smaller tolerance or start elsewhere",
-                          m->run->time, log_where(m->log));
+        return log_failed(
+            m->log,
+            "at time %.9g the loops have no solution near the last one (%s), or "
+            "are in a singular configuration that the motion does not pass; ask for a "
+            "smaller tolerance or start elsewhere",
+            m->run->time, log_where(m->log));
     memcpy(s->tree->X, f.X, sizeof f.X);
     memcpy(s->tree->slope, f.slope, sizeof f.slope);
     memcpy(v + OUTPUTS, f.y, NY * sizeof *v);
@@ -213,8 +214,8 @@ static double derivative(const double *d, double step, double *error) {
     return six;
 }
 
-#define DERIVATIVE_OF(field)                                                   \
-    (d[0] = f[1].field - f[0].field, d[1] = f[3].field - f[2].field,           \
+#define DERIVATIVE_OF(field)                                         \
+    (d[0] = f[1].field - f[0].field, d[1] = f[3].field - f[2].field, \
      d[2] = f[5].field - f[4].field, derivative(d, step, &error))
 
 core_status charts_difference(core_solver *s, charts_tangent *along) {

@@ -117,8 +117,7 @@ static int follow(const loops *l, const real *x, real *z) {
     int i, known = 0, status;
     for (i = 0; i < NZ; i++) slope[i] = REAL(0.0);
     for (i = 0; i < NX; i++)
-        if (MODEL_LEADS[i])
-            length = real_max(length, real_abs(x[i] - from[i]) / size[STATES + i]);
+        if (MODEL_LEADS[i]) length = real_max(length, real_abs(x[i] - from[i]) / size[STATES + i]);
     largest = real_min(REAL(1.0), STRIDE / real_max(length, STRIDE));
     part = length > REAL(0.0) ? FIRST * largest : REAL(1.0);
     memcpy(z, l->z, sizeof trial);
@@ -240,7 +239,8 @@ static void trial_start(const loops *l, int k, const real *near, real *z) {
         z[i] = l->guess[i];
         if (k == 1 && !guessed(l, i)) z[i] = near[i];
         if (k > 1 && (k % 2 || !guessed(l, i)))
-            z[i] += (MODEL_TURNS[i] ? HALF_TURN : MODEL_SPANS[i]) * scattered((unsigned)k, (unsigned)i);
+            z[i] +=
+                (MODEL_TURNS[i] ? HALF_TURN : MODEL_SPANS[i]) * scattered((unsigned)k, (unsigned)i);
     }
 }
 

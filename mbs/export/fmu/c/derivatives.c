@@ -115,7 +115,8 @@ static int is_accurate(machine *m) {
         if (trial_accelerations(m, k, found[k])) return 0;
     for (i = 0; i < NX + N_PASSIVE; i++) {
         size = fmax(size, fabs(found[0][i]));
-        for (k = 1; k < TRIAL_MOVES; k++) difference = fmax(difference, fabs(found[k][i] - found[0][i]));
+        for (k = 1; k < TRIAL_MOVES; k++)
+            difference = fmax(difference, fabs(found[k][i] - found[0][i]));
     }
     for (i = 0; i < NX; i++)
         speed = fmax(speed, fabs(m->values[DERIVATIVES + i]) / MODEL_NOMINAL[STATES + i]);

@@ -31,7 +31,8 @@ static face *instantiate(fmi3String name, fmi3String token, int cosimulation, fm
     face *f;
     if (!name || !*name) return no_instance(environment, logger, "the instance has no name");
     if (!token || strcmp(token, MODEL_GUID))
-        return no_instance(environment, logger, "the instantiation token is not the one of this "
+        return no_instance(environment, logger,
+                           "the instantiation token is not the one of this "
                            "model: the model description and the library belong to different FMUs");
 #ifdef MODEL_BARE
     if (!cosimulation)
@@ -71,12 +72,13 @@ static int report(void *host, double time, int may_return, double *until) {
     return asked;
 }
 
-fmi3Instance fmi3InstantiateCoSimulation(
-    fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
-    fmi3Boolean logging, fmi3Boolean event_mode, fmi3Boolean early_return,
-    const fmi3ValueReference intermediate[], size_t n_intermediate,
-    fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
-    fmi3IntermediateUpdateCallback update) {
+fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources,
+                                         fmi3Boolean visible, fmi3Boolean logging,
+                                         fmi3Boolean event_mode, fmi3Boolean early_return,
+                                         const fmi3ValueReference intermediate[],
+                                         size_t n_intermediate, fmi3InstanceEnvironment environment,
+                                         fmi3LogMessageCallback logger,
+                                         fmi3IntermediateUpdateCallback update) {
     face *f;
     size_t i;
     (void)resources, (void)visible;
@@ -99,7 +101,8 @@ fmi3Instance fmi3InstantiateScheduledExecution(
     fmi3UnlockPreemptionCallback unlock) {
     (void)name, (void)token, (void)resources, (void)visible, (void)logging;
     (void)clock_update, (void)lock, (void)unlock;
-    return no_instance(environment, logger, "this model has no scheduled execution; use model "
+    return no_instance(environment, logger,
+                       "this model has no scheduled execution; use model "
                        "exchange or co-simulation");
 }
 
@@ -125,8 +128,11 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_def
     return as_fmi(status ? status : core_enter_initialization(MODEL(c)));
 }
 
-#define FORWARD(name, call) \
-    fmi3Status name(fmi3Instance c) { NEED(c); return as_fmi(call(MODEL(c))); }
+#define FORWARD(name, call)            \
+    fmi3Status name(fmi3Instance c) {  \
+        NEED(c);                       \
+        return as_fmi(call(MODEL(c))); \
+    }
 
 FORWARD(fmi3ExitInitializationMode, core_exit_initialization)
 FORWARD(fmi3Terminate, core_terminate)
@@ -165,8 +171,8 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     return as_fmi(status);
 }
 
-fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
-                        fmi3Int32 value[], size_t n_values) {
+fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Int32 value[],
+                        size_t n_values) {
     NEED(c);
     if (n != n_values) return refused(c, "give one place for each integer variable");
     return as_fmi(core_get_modes(MODEL(c), vr, n, value));
@@ -179,16 +185,16 @@ fmi3Status fmi3SetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
 }
 
 /* Getters and setters of types without variables. */
-#define NO_VARIABLES(type, text)                                                                \
-    fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n,           \
-                             fmi3##type value[], size_t n_values) {                             \
-        (void)vr, (void)value, (void)n_values;                                                  \
-        return none(c, n, "the model has no " text " variables");                               \
-    }                                                                                           \
-    fmi3Status fmi3Set##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n,           \
-                             const fmi3##type value[], size_t n_values) {                       \
-        (void)vr, (void)value, (void)n_values;                                                  \
-        return none(c, n, "the model has no " text " variables");                               \
+#define NO_VARIABLES(type, text)                                                      \
+    fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, \
+                             fmi3##type value[], size_t n_values) {                   \
+        (void)vr, (void)value, (void)n_values;                                        \
+        return none(c, n, "the model has no " text " variables");                     \
+    }                                                                                 \
+    fmi3Status fmi3Set##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, \
+                             const fmi3##type value[], size_t n_values) {             \
+        (void)vr, (void)value, (void)n_values;                                        \
+        return none(c, n, "the model has no " text " variables");                     \
     }
 
 NO_VARIABLES(Float32, "32-bit float")
@@ -216,8 +222,9 @@ fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n
 
 fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReference vr, size_t *n) {
     (void)vr, (void)n;
-    return refused(c, "dependencies of elements are not listed; see those of the variables in the "
-                      "model description");
+    return refused(c,
+                   "dependencies of elements are not listed; see those of the variables in the "
+                   "model description");
 }
 
 fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference dependent,
@@ -226,6 +233,7 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference depend
                                        size_t n) {
     (void)dependent, (void)elements, (void)independents, (void)independent_elements;
     (void)kinds, (void)n;
-    return refused(c, "dependencies of elements are not listed; see those of the variables in the "
-                      "model description");
+    return refused(c,
+                   "dependencies of elements are not listed; see those of the variables in the "
+                   "model description");
 }

@@ -3,9 +3,7 @@
 
 #ifdef MODEL_ARRAYS
 
-static size_t size_of(fmi3ValueReference vr) {
-    return vr < N_VALUES ? (size_t)MODEL_SIZES[vr] : 1;
-}
+static size_t size_of(fmi3ValueReference vr) { return vr < N_VALUES ? (size_t)MODEL_SIZES[vr] : 1; }
 
 /* Allocate the references and orders of all elements. Returns 0 on failure: a reference is that of
  * an array element, or no memory is left. */
@@ -16,7 +14,8 @@ static int spread(fmi3Instance c, elements *e, const fmi3ValueReference vr[], si
     core_integer *of_order;
     for (i = 0; i < n; count += size_of(vr[i++]))
         if (!size_of(vr[i])) {
-            refused(c, "a value reference is that of an element of an array; use that of the array");
+            refused(c,
+                    "a value reference is that of an element of an array; use that of the array");
             return 0;
         }
     e->own = MODEL(c)->host.supply.take(c, (count + 1) * (sizeof *ref + sizeof *of_order));

@@ -6,12 +6,13 @@
 
 /* Error that the motion comes to a singular configuration. */
 static core_status passed(machine *m) {
-    return log_error(m->log,
-                     "between time %.9g and %.9g the motion comes to a singular configuration, where "
-                     "the states do not determine the dependent coordinates (at its end %s); choose "
-                     "other independent joints (assemble(active=...)), start elsewhere, or end the "
-                     "run before",
-                     m->accepted->watched.time, m->run->time, log_where(m->log));
+    return log_error(
+        m->log,
+        "between time %.9g and %.9g the motion comes to a singular configuration, where "
+        "the states do not determine the dependent coordinates (at its end %s); choose "
+        "other independent joints (assemble(active=...)), start elsewhere, or end the "
+        "run before",
+        m->accepted->watched.time, m->run->time, log_where(m->log));
 }
 
 /* Compute determinant signs, and velocities and accelerations of dependent joints, at this time. */

@@ -13,8 +13,8 @@
 typedef enum { INPUTS_HELD, INPUTS_MOVE, INPUTS_MOVED } core_input_motion;
 
 typedef struct {
-    int motion;  /* a core_input_motion */
-    double time; /* time of the derivatives and of the given values [s] */
+    int motion;                           /* a core_input_motion */
+    double time;                          /* time of the derivatives and of the given values [s] */
     double slopes[INPUT_ORDERS * NU + 1]; /* first, second, third derivatives of all inputs */
 } core_inputs;
 

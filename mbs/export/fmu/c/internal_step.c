@@ -61,8 +61,8 @@ core_status internal_step_failed(core_events *e, int status) {
         }
     show_state(s);
     if (status >= EVENTS_JUMP_FAILED)
-        return log_failed(l, "the event at time %.9g (%s) cannot be handled: %s%s", t,
-                          log_where(l), why, names);
+        return log_failed(l, "the event at time %.9g (%s) cannot be handled: %s%s", t, log_where(l),
+                          why, names);
 #endif
     show_state(s);
     return log_failed(l, "integration stopped at time %.9g (%s) with step %.3g: %s", t,

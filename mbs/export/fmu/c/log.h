@@ -15,12 +15,12 @@
 typedef void (*core_logger)(void *host, const char *name, core_status status, const char *message);
 
 typedef struct {
-    const char *name; /* of the instance */
+    const char *name;  /* of the instance */
     core_logger write; /* or NULL */
     void *host;        /* first argument of `write` */
     int discards;      /* 1 to log discarded calls too; errors are always logged */
     const core_run *run;
-    const double *states; /* (NX,) values of the states, for messages */
+    const double *states;                  /* (NX,) values of the states, for messages */
     char text[LOG_TEXT], where[LOG_WHERE]; /* last message, last list of state values */
 } core_log;
 

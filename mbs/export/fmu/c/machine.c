@@ -106,10 +106,11 @@ core_status machine_unsolved(machine *m) {
 }
 
 core_status machine_not_differentiable(machine *m, double sine) {
-    return log_error(m->log,
-                     "at time %.9g the configuration is so near a singular one (%s; sine %.2g) "
-                     "that second derivatives of the loops have no accuracy at these velocities; ask "
-                     "for derivatives at another configuration, at smaller velocities, or choose "
-                     "other independent joints (assemble(active=...))",
-                     m->run->time, log_where(m->log), sine);
+    return log_error(
+        m->log,
+        "at time %.9g the configuration is so near a singular one (%s; sine %.2g) "
+        "that second derivatives of the loops have no accuracy at these velocities; ask "
+        "for derivatives at another configuration, at smaller velocities, or choose "
+        "other independent joints (assemble(active=...))",
+        m->run->time, log_where(m->log), sine);
 }

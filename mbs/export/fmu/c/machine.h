@@ -15,7 +15,7 @@
 
 /* Values that the importer sets or reads. */
 typedef struct {
-    int stale; /* 1 if the calculated values are out of date */
+    int stale;                   /* 1 if the calculated values are out of date */
     double values[N_VALUES + 1]; /* by value reference, in SI units */
     double guess[NZ + 1];        /* guesses of the dependent coordinates at the start */
 #ifdef MODEL_TREE
@@ -26,7 +26,7 @@ typedef struct {
 
 /* Last accepted configuration: start of the Newton steps of the closure. */
 typedef struct {
-    int known; /* 1 if a configuration that closes the loops is known */
+    int known;                   /* 1 if a configuration that closes the loops is known */
     double x[NX + 1], z[NZ + 1]; /* states, dependent coordinates */
     watched watched;             /* reference of the checks in guard.h */
 } core_configuration;
@@ -38,8 +38,8 @@ typedef struct {
     double *values; /* variables->values */
     core_inputs *inputs;
     core_configuration *accepted;
-    loops loops;                  /* data of the closure; refers to `accepted` and the arrays below */
-    double z[NZ + 1], u[NU + 1];  /* dependent coordinates and inputs of the last evaluation */
+    loops loops; /* data of the closure; refers to `accepted` and the arrays below */
+    double z[NZ + 1], u[NU + 1];   /* dependent coordinates and inputs of the last evaluation */
     const double *arg[SZ_ARG + 1]; /* arguments, results and scratch of the generated functions */
     double *res[SZ_RES + 1];
     long long iw[SZ_IW + 1];
@@ -47,7 +47,8 @@ typedef struct {
 } machine;
 
 /* A generated function. Returns 0, or nonzero if it has no value. */
-typedef int (*machine_function)(const double **arg, double **res, long long *iw, double *w, int mem);
+typedef int (*machine_function)(const double **arg, double **res, long long *iw, double *w,
+                                int mem);
 
 /* Connect a machine with the data of its instance. */
 void machine_init(machine *m, core_run *run, core_log *log, core_variables *variables,

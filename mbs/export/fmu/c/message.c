@@ -2,9 +2,9 @@
 
 #include <math.h>
 
-#define EXACT 22 /* exponent of the largest power of ten that a double represents exactly */
+#define EXACT 22       /* exponent of the largest power of ten that a double represents exactly */
 #define MOST_DIGITS 15 /* number of decimal digits that a double always keeps */
-#define PLAIN -4 /* smaller powers of ten are written with an exponent, as printf does */
+#define PLAIN -4       /* smaller powers of ten are written with an exponent, as printf does */
 
 void message_begin(message *m, char *text, size_t size) {
     m->text = text;

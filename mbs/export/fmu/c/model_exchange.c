@@ -63,8 +63,7 @@ core_status core_enter_continuous_mode(core *c) {
 core_status core_completed_step(core *c, int *event) {
     core_status status;
     *event = 0;
-    if (!log_allowed(&c->log, CONTINUOUS, "completing a step") ||
-        core_check_stop(c, c->m.run.time))
+    if (!log_allowed(&c->log, CONTINUOUS, "completing a step") || core_check_stop(c, c->m.run.time))
         return CORE_ERROR;
     if (!NZ && !NK) return CORE_OK;
     status = event_mode_arm_indicators(&c->events);
@@ -102,7 +101,8 @@ core_status core_set_states(core *c, const double *x, size_t n) {
         return CORE_ERROR;
     for (i = 0; i < n; i++)
         if (!isfinite(x[i]))
-            return log_error(&c->log, "%s = %g is not finite", MODEL_NAMES[CONTINUOUS_STATES + i], x[i]);
+            return log_error(&c->log, "%s = %g is not finite", MODEL_NAMES[CONTINUOUS_STATES + i],
+                             x[i]);
     if (memcmp(states, x, n * sizeof *x)) c->m.variables.stale = 1;
     memcpy(states, x, n * sizeof *x);
     return CORE_OK;

@@ -20,9 +20,9 @@ enum {
     MODES = PARAMETERS + NP,
     DEPENDENTS = MODES + NM,
     INDICATORS = DEPENDENTS + NZ,
-    CHART_STATES = INDICATORS + NK, /* continuous states of closed loops in model exchange (charts.h) */
-    CHART_RATES = CHART_STATES + NS,      /* derivatives of these states */
-    CHART_INDICATOR = CHART_RATES + NS,      /* event indicator of a change of their coordinates */
+    CHART_STATES = INDICATORS + NK,     /* continuous states of model exchange, see charts.h */
+    CHART_RATES = CHART_STATES + NS,    /* derivatives of these states */
+    CHART_INDICATOR = CHART_RATES + NS, /* event indicator of a change of their coordinates */
     N_VALUES = CHART_INDICATOR + NC,
     TIME_REFERENCE = N_VALUES /* the independent variable time, a variable in FMI 3.0 only */
 };

@@ -9,9 +9,9 @@ typedef enum { CORE_OK, CORE_DISCARD, CORE_ERROR } core_status;
 typedef enum {
     INSTANTIATED = 1,
     INITIALIZATION = 2,
-    EVENT = 4,       /* event mode */
-    CONTINUOUS = 8,  /* continuous-time mode of model exchange */
-    STEP = 16,       /* step mode of co-simulation */
+    EVENT = 4,      /* event mode */
+    CONTINUOUS = 8, /* continuous-time mode of model exchange */
+    STEP = 16,      /* step mode of co-simulation */
     TERMINATED = 32,
     INTERMEDIATE = 64 /* intermediate update within a communication step: values can be read */
 } core_mode;

@@ -65,7 +65,8 @@ static int ours(core *c, const core_state *s) {
 }
 
 core_status core_restore(core *c, const core_state *state) {
-    if (!log_allowed(&c->log, ~INTERMEDIATE, "restoring a state") || !ours(c, state)) return CORE_ERROR;
+    if (!log_allowed(&c->log, ~INTERMEDIATE, "restoring a state") || !ours(c, state))
+        return CORE_ERROR;
     memcpy(&c->m, &state->m, sizeof c->m);
 #ifdef MODEL_TREE
     if (c->solver.passage) passage_forget(c->solver.passage);

@@ -113,8 +113,8 @@ static int init_tree(core_solver *s) {
 #endif
         dopri5_init(&s->stepper, NT, tree_rhs, s, s->memory->stepper, s->work);
     s->stepper.project = tree_project;
-    s->passage = passage_new(&s->stepper, &TREE_SIZE, NULL, &model, &s->tree->passage,
-                             s->tree->origin);
+    s->passage =
+        passage_new(&s->stepper, &TREE_SIZE, NULL, &model, &s->tree->passage, s->tree->origin);
     return s->passage == NULL;
 }
 

@@ -43,9 +43,9 @@ extern const passage_size TREE_SIZE;
 #if MODEL_TREE_OUTSIDE
 /* Coordinates for which the continuous states of model exchange stand, see charts.h. */
 typedef struct {
-    int tangent; /* 1 if the states are local tangent coordinates */
-    int loose;   /* 1 if joint values were set, so that the joints become the states again */
-    int settled; /* 1 if the coordinates of the next steps are chosen */
+    int tangent;      /* 1 if the states are local tangent coordinates */
+    int loose;        /* 1 if joint values were set, so that the joints become the states again */
+    int settled;      /* 1 if the coordinates of the next steps are chosen */
     double alignment; /* alignment of the tangents with the chart: 1 at its origin, 0 orthogonal */
     double time, X[NT], slope[NT]; /* last accepted time, tree state and its derivative */
 } core_charts;
@@ -53,7 +53,7 @@ typedef struct {
 
 /* Data that a run changes. */
 typedef struct {
-    double tolerance; /* relative, and absolute in nominal sizes */
+    double tolerance;                             /* relative, and absolute in nominal sizes */
     double stepper[STEPPER_MEMORY(N_INTEGRATED)]; /* step size and history of the integrator */
 #ifdef MODEL_TREE
     core_tree tree;

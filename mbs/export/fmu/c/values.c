@@ -38,7 +38,8 @@ static int given(int mode, core_reference ref) {
 static core_status update(core *c, core_reference ref) {
     if (among(ref, INDICATORS, CHART_STATES)) return event_mode_show_indicators(&c->events);
 #if MODEL_TREE_OUTSIDE
-    if (ref == CHART_INDICATOR && !c->m.run.cosimulation) return chart_choice_show_indicator(&c->solver);
+    if (ref == CHART_INDICATOR && !c->m.run.cosimulation)
+        return chart_choice_show_indicator(&c->solver);
 #endif
     return given(c->m.run.mode, ref) ? CORE_OK : calculate(&c->solver);
 }
@@ -117,8 +118,7 @@ static core_status within_bounds(core_log *l, core_reference ref, double value) 
         return log_error(l, "parameter %s is %g; give a number from %g to %g", name, value, low,
                          high);
     if (value > high) return log_error(l, "parameter %s is %g; give %g or less", name, value, high);
-    if (low == DBL_MIN)
-        return log_error(l, "parameter %s is %g; give more than zero", name, value);
+    if (low == DBL_MIN) return log_error(l, "parameter %s is %g; give more than zero", name, value);
     return log_error(l, "parameter %s is %g; give %g or more", name, value, low);
 }
 

@@ -79,7 +79,7 @@ def test_unknown_name_is_an_attribute_error() -> None:
 def test_types_and_c_sources_are_shipped() -> None:
     package = resources.files("mbs")
     assert (package / "py.typed").is_file()
-    assert (package / "export" / "fmu" / "c" / "core.c").is_file()
+    assert (package / "export" / "fmu" / "c" / "instance.c").is_file()
     assert (package / "core" / "source" / "dopri5.c").is_file()
     assert (package / "view" / "assets" / "viewer.js").is_file()
 

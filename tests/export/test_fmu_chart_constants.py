@@ -179,23 +179,23 @@ def test_states_beside_the_motion_are_refused(written, constant, start, move, sp
 def test_joints_are_states_up_to_where_they_hold_a_tenth(written, factor, position):
     ours = by_joints(written("slider-crank"), position)
     assert ours == (factor > 1)
-    assert by_joints(written("slider-crank", "charts.c", "HOLD", factor), position) != ours
+    assert by_joints(written("slider-crank", "chart_choice.c", "HOLD", factor), position) != ours
 
 
 @pytest.mark.parametrize(("factor", "beside"), [(10.0, 4e-6), (0.1, 4e-7)])
 def test_an_event_at_the_limit_changes_the_states(written, factor, beside):
     ours = switches(written("slider-crank"), beside)
     assert ours == (factor < 1)
-    assert switches(written("slider-crank", "charts.c", "NEAR", factor), beside) != ours
+    assert switches(written("slider-crank", "chart_choice.c", "NEAR", factor), beside) != ours
 
 
 def test_charts_are_left_and_made_anew_in_time(written):
     error, events = motion(written("parallelogram"))
     assert error < 100
     assert events == 6
-    assert motion(written("parallelogram", "charts.c", "LEAVE", 10.0))[1] < 3
-    assert motion(written("parallelogram", "charts.c", "LEAVE", 0.1))[0] == np.inf
-    assert motion(written("parallelogram", "charts.c", "TURNED", 10.0))[1] > 12
+    assert motion(written("parallelogram", "chart_choice.c", "LEAVE", 10.0))[1] < 3
+    assert motion(written("parallelogram", "chart_choice.c", "LEAVE", 0.1))[0] == np.inf
+    assert motion(written("parallelogram", "chart_choice.c", "TURNED", 10.0))[1] > 12
 
 
 def test_differences_are_between_truncation_and_rounding(written):

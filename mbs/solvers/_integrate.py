@@ -91,6 +91,7 @@ class IntegrationCode:
         spent: time of the interpreted runs so far [s].
         source: C code; None until it is written.
         instructions: number of instructions of all functions.
+        passage: sizes, patterns and typical regularity for singular configurations, or None.
         machine_code: one callable per function that returns a new evaluation of its machine code,
             which has scratch memory of its own; None if the function is missing. Empty until the
             functions are compiled.
@@ -102,12 +103,14 @@ class IntegrationCode:
     spent: float = 0.0
     source: str | None = None
     instructions: int = field(init=False)
+    passage: tuple[Any, ...] | None = field(init=False)
     machine_code: tuple[Callable[[], Any] | None, ...] = ()
 
     def __post_init__(self) -> None:
         every = (g for f in self.equations.all for g in (f, *f.find_functions()))
         counted = (g for g in every if g.is_a("SXFunction") or g.is_a("MXFunction"))
         self.instructions = sum(g.n_instructions() for g in counted)
+        self.passage = _passage_data(self.equations.passage)
 
     def is_worth(self, further: float, cost: tuple[float, float]) -> bool:
         """Return whether interpreted runs have taken longer than some other work would take.
@@ -234,7 +237,7 @@ def _integration(given: IntegrationProblem, code: IntegrationCode) -> Any:
         return core_library().integration(
             code.evaluations(),
             (*sizes, 0 if indicators is None else indicators.numel_out(0)),
-            _passage_data(own.passage),
+            code.passage,
             given.p,
             (given.rtol, given.atol, given.max_step, own.first_step),
             None if given.sizes is None else np.ascontiguousarray(given.sizes),

@@ -206,10 +206,10 @@ static real cut_distance(const loops *l, const real *x, const real *z) {
     l->arg[2] = l->p;
     l->res[0] = at;
     if (mbs_cuts(l->arg, l->res, l->iw, l->w, 0)) return UNBOUNDED;
-    for (i = 0; i < NCUT; i++) { /* a quaternion and its negative are one orientation */
+    for (i = 0; i + 4 <= NCUT; i++) { /* a quaternion and its negative are one orientation */
         real along = REAL(0.0);
-        for (k = i; MODEL_QUATERNIONS[i] && k < i + 4; k++) along += at[k] * l->cut[k];
-        for (k = i; along < REAL(0.0) && k < i + 4; k++) at[k] = -at[k];
+        for (k = 0; MODEL_QUATERNIONS[i] && k < 4; k++) along += at[i + k] * l->cut[i + k];
+        for (k = 0; along < REAL(0.0) && k < 4; k++) at[i + k] = -at[i + k];
     }
     for (i = 0; i < NCUT; i++)
         if (cut_guessed(l, i))

@@ -32,8 +32,8 @@ from mbs.components import Coupling, FixedTendon
 from mbs.components.joints import Motion
 from mbs.expressions import to_float
 from mbs.formats import read_mjcf
+from mbs.formats.files import Notes
 from mbs.formats.mjcf.reader import MjcfModel
-from mbs.formats.notes import Notes
 from mbs.recursions.route import relative_pose
 
 IN_CONSTRAINTS = 1e-8

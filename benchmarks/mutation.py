@@ -1,19 +1,21 @@
 """Whether the tests notice when one thing in the numeric core is wrong.
 
-One operator, constant, condition, index or statement of mbs/spatial, solvers, recursions or loops
-is changed in memory, while it is imported; no file is. Then the tests that execute its line run,
-the quickest of the package first, until one fails. A mutant that none of them notices has survived:
-the tests have a gap, or the change means nothing.
+A mutant is a module with one changed operator, constant, condition, index or statement. The change
+is made in memory during the import. The tests that execute the changed line run, the quickest of
+the package first, until one fails. A mutant survives if no test fails: the tests have a gap, or the
+change has no effect.
 
-    python benchmarks/mutation.py cover tests/spatial       which tests execute which line; adds up
-    python benchmarks/mutation.py run --count 200 --seed 1  the sample; goes on where it was stopped
+    python benchmarks/mutation.py cover --count 60 --seed 1 tests/spatial
+                                                            which tests execute which lines of the
+                                                            files of the sample; adds up
+    python benchmarks/mutation.py run --count 60 --seed 1   the sample; continues an interrupted run
     python benchmarks/mutation.py report                    killed by package; survivors with lines
     python benchmarks/mutation.py again NUMBER ...          these mutants of the sample once more
     python benchmarks/mutation.py check                     the tests that killed pass without
 
-All is kept in build/mutation. The sample has mutants of every package by its lines of code. Not
-mutated: imports, docstrings, annotations, decorators, text, assertions and what raises errors.
-What tests start as processes of their own is not mutated.
+Results are stored in build/mutation. The number of mutants of a package is proportional to its
+lines of code. Imports, docstrings, annotations, decorators, text, assertions and raise statements
+are not mutated. Mutants do not exist in processes that tests start.
 """
 
 from __future__ import annotations
@@ -38,7 +40,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = ROOT / "build" / "mutation"
-PACKAGES = ("spatial", "solvers", "recursions", "loops")
+PACKAGES = tuple(sorted(p.parent.name for p in (ROOT / "mbs").glob("*/__init__.py")))
 
 CAP = 40.0
 """Seconds of tests for a mutant: those that notice one mostly do in the first few."""
@@ -256,7 +258,7 @@ def mutants(file: str) -> list[Mutant]:
 
 def sample(count: int, seed: int) -> list[Mutant]:
     """Mutants of every package, by its lines."""
-    files = {p: sorted((ROOT / "mbs" / p).glob("*.py")) for p in PACKAGES}
+    files = {p: sorted((ROOT / "mbs" / p).rglob("*.py")) for p in PACKAGES}
     lines = {p: sum(len(f.read_text("utf-8").splitlines()) for f in files[p]) for p in PACKAGES}
     shares = {p: count * lines[p] / sum(lines.values()) for p in PACKAGES}
     numbers = {p: int(shares[p]) for p in PACKAGES}
@@ -275,14 +277,14 @@ def sample(count: int, seed: int) -> list[Mutant]:
 
 
 class Recorder:
-    """Notes for every test its duration, and the lines that it executes."""
+    """Duration of each test, and the lines of the given files that it executes."""
 
-    def __init__(self) -> None:
+    def __init__(self, files: list[str]) -> None:
         import coverage
 
-        self.data = KEPT / "coverage"
-        packages = [str(ROOT / "mbs" / p) for p in PACKAGES]
-        self.cover = coverage.Coverage(str(self.data), source=packages, config_file=False)
+        self.data = KEPT / f"coverage-{os.getpid()}"
+        include = [str(ROOT / file) for file in files]
+        self.cover = coverage.Coverage(str(self.data), include=include, config_file=False)
         self.durations: dict[str, float] = defaultdict(float)
         self.failed: set[str] = set()
 
@@ -299,10 +301,10 @@ class Recorder:
             self.failed.add(report.nodeid)
 
 
-def cover(paths: list[str]) -> None:
-    """Run tests, and add what they execute to what is known."""
+def cover(count: int, seed: int, paths: list[str]) -> None:
+    """Run tests, and add the lines that they execute in files of the sample to tests.json."""
     KEPT.mkdir(parents=True, exist_ok=True)
-    recorder = Recorder()
+    recorder = Recorder(sorted({mutant.file for mutant in sample(count, seed)}))
     recorder.data.unlink(missing_ok=True)
     recorder.cover.start()
     pytest.main([*paths, "-q", "-p", "no:cacheprovider"], plugins=[recorder])
@@ -319,6 +321,7 @@ def cover(paths: list[str]) -> None:
         if test not in recorder.failed and test in lines:
             known[test] = {"seconds": round(seconds, 3), "lines": lines[test]}
     _write("tests.json", known)
+    recorder.data.unlink()
 
 
 def tests_of(mutant: Mutant, known: dict) -> list[str]:
@@ -475,9 +478,10 @@ def run(count: int, seed: int, again: list[int]) -> None:
     count, seed = (results["count"], results["seed"]) if again else (count, seed)
     if (results["seed"], results["count"]) != (seed, count):
         results = {"seed": seed, "count": count, "mutants": {}}
+    known = _read("tests.json")
     for number, mutant in enumerate(sample(count, seed)):
         if number in again or (not again and str(number) not in results["mutants"]):
-            said = results["mutants"][str(number)] = try_mutant(mutant, _read("tests.json"))
+            said = results["mutants"][str(number)] = try_mutant(mutant, known)
             _write("results.json", results)
             by = said["by"].splitlines()[0] if said["by"] else ""
             print(number, f"{mutant.file}:{mutant.lines[0]}", mutant.what, said["outcome"], by,
@@ -492,7 +496,7 @@ def report() -> None:
     for said in results["mutants"].values():
         by[said["file"].split("/")[1]][said["outcome"]] += 1
     for package in PACKAGES:
-        print(f"  {package:10}", dict(by[package]))
+        print(f"  {package:14}", dict(by[package]))
     for number, said in results["mutants"].items():
         if said["outcome"] != "killed":
             line = (ROOT / said["file"]).read_text("utf-8").splitlines()[said["lines"][0] - 1]
@@ -521,16 +525,17 @@ if __name__ == "__main__":
         one(json.load(sys.stdin))
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(dest="command", required=True)
-    commands.add_parser("cover").add_argument("paths", nargs="+")
-    chosen = commands.add_parser("run")
-    chosen.add_argument("--count", type=int, default=200)
-    chosen.add_argument("--seed", type=int, default=1)
+    for command in ("cover", "run"):
+        chosen = commands.add_parser(command)
+        chosen.add_argument("--count", type=int, default=60)
+        chosen.add_argument("--seed", type=int, default=1)
+    commands.choices["cover"].add_argument("paths", nargs="+")
     commands.add_parser("report")
     commands.add_parser("again").add_argument("numbers", type=int, nargs="+")
     commands.add_parser("check")
     given = parser.parse_args()
     if given.command == "cover":
-        cover(given.paths)
+        cover(given.count, given.seed, given.paths)
     elif given.command in ("run", "again"):
         run(getattr(given, "count", 0), getattr(given, "seed", 0), getattr(given, "numbers", []))
     else:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mbs.assembly import System
 from mbs.components.joints import Motion
-from mbs.recursions.poses import base_poses, link_poses
+from mbs.recursions.link_motions import base_poses, link_poses
 from mbs.spatial import Pose
 
 Array = np.ndarray[Any, Any]

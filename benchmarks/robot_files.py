@@ -26,7 +26,7 @@ import mbs
 from mbs import MbsError
 from mbs.components import Coupling
 from mbs.formats import read_urdf
-from mbs.formats.notes import Notes
+from mbs.formats.files import Notes
 from mbs.formats.urdf.reader import FREE_JOINT, element_names, read_tree
 from mbs.formats.xml import parse_xml
 from mbs.recursions.route import relative_pose

@@ -94,6 +94,8 @@ def on_arrays(function: Function) -> OnArrays:
     sizes = [function.nnz_in(k) for k in range(function.n_in())]
     patterns = [function.sparsity_out(k) for k in range(function.n_out())]
     places = [None if one.is_dense() else one.get_triplet() for one in patterns]
+    counts = [one.nnz() for one in patterns]
+    shapes = [(one.size1(), one.size2()) for one in patterns]
 
     def evaluated(*arguments: Array) -> list[Array]:
         made: Any = function.buffer()
@@ -101,7 +103,7 @@ def on_arrays(function: Function) -> OnArrays:
         given = [np.ascontiguousarray(value, dtype=float) for value in arguments]
         if [array.size for array in given] != sizes:
             raise ValueError(f"{function.name()} takes arrays of {sizes} elements")
-        found = [np.empty(one.nnz()) for one in patterns]
+        found = [np.empty(count) for count in counts]
         for k, array in enumerate(given):
             buffer.set_arg(k, array.reshape(-1).data)
         for k, array in enumerate(found):
@@ -109,19 +111,20 @@ def on_arrays(function: Function) -> OnArrays:
         run()
         if buffer.ret():
             raise RuntimeError(f"{function.name()} has no value there")
-        return list(map(_filled, found, patterns, places))
+        return list(map(_filled, found, shapes, places))
 
     return evaluated
 
 
-def _filled(values: Array, pattern: Any, places: tuple[list[int], list[int]] | None) -> Array:
-    """Return the matrix with the elements `values` of a sparsity pattern, zero outside of it.
+def _filled(
+    values: Array, shape: tuple[int, int], places: tuple[list[int], list[int]] | None
+) -> Array:
+    """Return the matrix of the shape `shape` with the elements `values`, zero elsewhere.
 
-    `places` are row and column indices of the elements; None if the pattern is dense.
+    `places` are row and column indices of the elements. None means all places, column by column.
     """
     if places is None:
-        rows, columns = pattern.shape
-        return np.ascontiguousarray(values.reshape(columns, rows).T)
-    full = np.zeros(pattern.shape)
+        return np.ascontiguousarray(values.reshape(shape[::-1]).T)
+    full = np.zeros(shape)
     full[places] = values
     return full

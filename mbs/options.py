@@ -1,20 +1,29 @@
 """Options of an action as fields of a frozen dataclass.
 
-The keyword arguments of the action, the text of its docstring, its options on the command line and
-its form in the app are derived from the fields. Each field has a default, and its metadata is an
-`OptionInfo`.
+The arguments of the action, the text of its docstring, its options on the command line and its form
+in the app are derived from the fields. The metadata of each field is an `OptionInfo`.
 """
 
 from __future__ import annotations
 
 import functools
 import inspect
-import os
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import Field, dataclass, fields
+from dataclasses import MISSING, Field, dataclass, fields
 from types import UnionType
-from typing import Any, Literal, ParamSpec, Protocol, TypeVar, get_args, get_origin, get_type_hints
+from typing import (
+    Any,
+    Concatenate,
+    Literal,
+    ParamSpec,
+    TypeVar,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+
+from mbs.text import quoted
 
 _KEY = "mbs.option"
 _WIDTH = 96
@@ -27,6 +36,17 @@ Check = Callable[[str, object], str]
 def _always_valid(label: str, value: object) -> str:
     """Return "": the check of an option whose values are all valid."""
     return ""
+
+
+def one_of(names: Sequence[str]) -> Check:
+    """Return the check that a value is one of some names."""
+
+    def check(label: str, value: object) -> str:
+        if isinstance(value, str) and value in names:
+            return ""
+        return f"{label} is {quoted(value)}; use {' or '.join(map(repr, names))}"
+
+    return check
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -150,8 +170,18 @@ def option_fields(options: Any) -> dict[str, tuple[Field[Any], OptionInfo]]:
         options: dataclass or its instance. Fields without `OptionInfo` are left out.
     """
     return {
-        field.name: (field, option_of(field)) for field in fields(options) if _KEY in field.metadata
+        field.name: (field, option_of(field))
+        for field in _in_order(options)
+        if _KEY in field.metadata
     }
+
+
+def _in_order(options: Any) -> list[Field[Any]]:
+    """Return the fields of a dataclass in the order of its arguments: keyword-only ones last.
+
+    `options` is the dataclass or its instance.
+    """
+    return sorted(fields(options), key=lambda field: field.kw_only is True)
 
 
 def faults(options: Any) -> Iterator[str]:
@@ -165,97 +195,120 @@ def faults(options: Any) -> Iterator[str]:
             yield sentence
 
 
-def group_values(options: Any, group: type) -> dict[str, Any]:
-    """Return the values of those options that a group (a base class) of options has, by name.
+def group_values(options: Any, *groups: type) -> dict[str, Any]:
+    """Return the values of those options that groups (base classes) of options have, by name.
 
     Args:
-        options: instance of a dataclass that is derived from `group`.
-        group: dataclass.
+        options: instance of a dataclass that is derived from the groups.
+        *groups: dataclasses.
     """
-    return {field.name: getattr(options, field.name) for field in fields(group)}
+    return {field.name: getattr(options, field.name) for group in groups for field in fields(group)}
 
 
-# Keyword arguments of a function, from the fields of the options.
+# Arguments of a function, from the fields of a dataclass.
 
 
 _P = ParamSpec("_P")
-_Options = TypeVar("_Options", contravariant=True)
-_System = TypeVar("_System", contravariant=True)
-_Result = TypeVar("_Result", covariant=True)
+_Options = TypeVar("_Options")
+_Self = TypeVar("_Self")
+_Result = TypeVar("_Result")
 
 
-class _WithOptions(Protocol[_System, _Options, _Result]):
-    """Function of a system, the path of a file to write, and the argument `options`."""
-
-    def __call__(
-        self, system: _System, path: str | os.PathLike[str], *, options: _Options
-    ) -> _Result: ...
-
-
-class WithKeywords(Protocol[_System, _P, _Result]):
-    """Function of a system, the path of a file to write, and options by keyword."""
-
-    def __call__(
-        self,
-        system: _System,
-        path: str | os.PathLike[str],
-        *args: _P.args,
-        **kwargs: _P.kwargs,
-    ) -> _Result:
-        """Call the function."""
-
-
-def keywords_of(
+def arguments_of(
     options: Callable[_P, _Options],
-) -> Callable[[_WithOptions[_System, _Options, _Result]], WithKeywords[_System, _P, _Result]]:
-    """Return a decorator that replaces the argument `options` by one keyword for each field.
+) -> Callable[[Callable[[_Options], _Result]], Callable[_P, _Result]]:
+    """Return a decorator that replaces the argument `options` of a function by its fields.
 
     Signature, annotations and the entry `options` in the docstring are replaced, too.
 
     Args:
-        options: dataclass, whose fields are keyword-only and have defaults and descriptions.
+        options: dataclass of all arguments. Its keyword-only fields become keyword-only arguments.
     """
 
-    def decorate(
-        action: _WithOptions[_System, _Options, _Result],
-    ) -> WithKeywords[_System, _P, _Result]:
-        known = option_fields(options)
-
-        @functools.wraps(action)
-        def call(*args: Any, **keywords: Any) -> Any:
-            own: dict[str, Any] = {
-                name: keywords.pop(name) for name in [*keywords] if name in known
-            }
-            made: Callable[..., _Options] = options
-            return action(*args, options=made(**own), **keywords)
-
-        own = inspect.signature(action)
-        taken = [
-            inspect.Parameter(
-                name, inspect.Parameter.KEYWORD_ONLY, default=field.default, annotation=field.type
-            )
-            for name, (field, _) in known.items()
-        ]
-        others = [p for p in own.parameters.values() if p.name != "options"]
-        hints = get_type_hints(action) | get_type_hints(options)
-        named = [p.name for p in (*others, *taken)]
-        call.__annotations__ = {name: hints[name] for name in (*named, "return")}
-        vars(call)["__signature__"] = own.replace(parameters=[*others, *taken])
-        call.__doc__ = _documented(inspect.getdoc(action) or "", known)
-        return call
+    def decorate(action: Callable[[_Options], _Result]) -> Callable[_P, _Result]:
+        made: Callable[_P, _Result] = _with_fields(action, options)
+        return made
 
     return decorate
 
 
-def _documented(doc: str, known: Mapping[str, tuple[Field[Any], OptionInfo]]) -> str:
-    """Return a docstring in which the entry `options` is replaced by one entry per option."""
+def method_arguments_of(
+    options: Callable[_P, _Options],
+) -> Callable[[Callable[[_Self, _Options], _Result]], Callable[Concatenate[_Self, _P], _Result]]:
+    """Return the decorator of `arguments_of` for a method.
+
+    Args:
+        options: dataclass of all arguments.
+    """
+
+    def decorate(
+        action: Callable[[_Self, _Options], _Result],
+    ) -> Callable[Concatenate[_Self, _P], _Result]:
+        made: Callable[Concatenate[_Self, _P], _Result] = _with_fields(action, options)
+        return made
+
+    return decorate
+
+
+def _with_fields(action: Callable[..., Any], options: Any) -> Any:
+    """Return a function that has the fields of `options` as parameters in place of `options`.
+
+    It calls `action` with an instance of the dataclass `options`. Its text is executed, as for the
+    methods of a dataclass, so that wrong arguments raise the errors of Python with the name of
+    `action`.
+    """
+    every = _in_order(options)
+    own = inspect.signature(action)
+    first = [p for p in own.parameters.values() if p.name != "options"]
+    taken = [inspect.Parameter(f.name, _kind_of(f), default=_default_of(f)) for f in every]
+    plain = inspect.Signature(
+        [*first, *(p if p.default is p.empty else p.replace(default=None) for p in taken)]
+    )
+    passed = ", ".join([*(p.name for p in first), f"_options({', '.join(map(_passed, every))})"])
+    scope: dict[str, Any] = {"_action": action, "_options": options}
+    exec(f"def _call{plain}: return _action({passed})", scope)
+    call: Any = functools.wraps(action)(scope["_call"])
+    given = [p for p in taken if p.default is not p.empty]
+    call.__defaults__ = tuple(p.default for p in given if p.kind is not p.KEYWORD_ONLY)
+    call.__kwdefaults__ = {p.name: p.default for p in given if p.kind is p.KEYWORD_ONLY}
+    hints = get_type_hints(action) | get_type_hints(options)
+    call.__annotations__ = {
+        name: hints[name] for name in (*plain.parameters, "return") if name in hints
+    }
+    shown = [p.replace(annotation=f.type) for p, f in zip(taken, every, strict=True)]
+    call.__signature__ = own.replace(parameters=[*first, *shown])
+    call.__doc__ = _documented(inspect.getdoc(action) or "", every)
+    return call
+
+
+def _kind_of(field: Field[Any]) -> Any:
+    """Return the kind of the parameter of a dataclass field, as in `inspect.Parameter`."""
+    kinds = inspect.Parameter
+    return kinds.KEYWORD_ONLY if field.kw_only else kinds.POSITIONAL_OR_KEYWORD
+
+
+def _default_of(field: Field[Any]) -> Any:
+    """Return the default of the parameter of a field; `inspect.Parameter.empty` if it has none."""
+    return inspect.Parameter.empty if field.default is MISSING else field.default
+
+
+def _passed(field: Field[Any]) -> str:
+    """Return the text that passes the value of a parameter to its field."""
+    return f"{field.name}={field.name}" if field.kw_only else field.name
+
+
+def _documented(doc: str, every: Sequence[Field[Any]]) -> str:
+    """Return the docstring `doc` in which the entry `options` is replaced by entries of fields.
+
+    `every` are the fields, in the order of the entries.
+    """
     lines = []
     for line in doc.splitlines():
         if line.strip().startswith("options: "):
             indent = line[: len(line) - len(line.lstrip())]
-            for name, (_, option) in known.items():
+            for field in every:
                 lines += textwrap.wrap(
-                    f"{name}: {option.sentences}",
+                    f"{field.name}: {option_of(field).sentences}",
                     _WIDTH,
                     initial_indent=indent,
                     subsequent_indent=2 * indent,

@@ -185,7 +185,7 @@ class Result:
                 f"result {self.name!r}: time has shape {time.shape} and values {values.shape} for "
                 f"{len(self.units)} names; give (n,) and (n, number of names)"
             )
-        if np.any(np.diff(time) < 0):
+        if (time[1:] < time[:-1]).any():
             raise ModelError(f"result {self.name!r}: time goes backwards; sort the rows by time")
         object.__setattr__(self, "time", time)
         object.__setattr__(self, "values", values)

@@ -13,6 +13,8 @@ import mbs
 from mbs import MbsError
 from mbs.app.tasks.simulation import SimulationSettings, simulate
 from mbs.components import Box, Custom, Revolute, custom
+from mbs.options import option_fields
+from mbs.simulate.options import MotionOptions
 
 PAGE = Path(__file__).parents[1] / "docs" / "validity.md"
 DURATION = 0.2
@@ -472,7 +474,8 @@ def by_page(name, content, tmp_path):
     given = {names.get(key, key): value for key, value in content.items()}
     if "motion" in given:
         given["motion"] = {"j1.a": "0.5"}
-    settings = SimulationSettings(duration=DURATION, step=DURATION, **given)
+    options = {name: given.pop(name) for name in option_fields(MotionOptions) if name in given}
+    settings = SimulationSettings(duration=DURATION, options={"step": DURATION, **options}, **given)
     return simulate(loop(), settings, quiet=True)["j1.q"][-1]
 
 

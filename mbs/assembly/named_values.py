@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from casadi import DM
 
-from mbs.assembly.inertias import inertia_notes
+from mbs.assembly.parameter_bounds import inertia_notes
 from mbs.assembly.system_data import SystemData
 from mbs.assembly.tables import Coordinate
 from mbs.assembly.variable_names import EFFORTS, GUESSES, VELOCITIES, by_coordinate

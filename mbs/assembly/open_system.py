@@ -9,9 +9,8 @@ from casadi import SX
 
 from mbs.assembly.drive_line import drive_line, shaft_rows
 from mbs.assembly.graph import BodyGraph, connection_graph, spanning_tree
-from mbs.assembly.inertias import inertia_notes
 from mbs.assembly.khalil_frames import Cut, KhalilTree, khalil_frames
-from mbs.assembly.parameter_bounds import bounded_fields, parameter_bounds
+from mbs.assembly.parameter_bounds import bounded_fields, inertia_notes, parameter_bounds
 from mbs.assembly.parts import (
     ComponentInstance,
     attached_parts,

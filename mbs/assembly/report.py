@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from mbs.assembly.degrees import like_degrees
 from mbs.assembly.system_data import SystemData
 from mbs.assembly.tables import Closure
+from mbs.assembly.variable_names import like_degrees
 from mbs.text import listed
 
 

@@ -1,11 +1,17 @@
-"""Names of variables of FMUs and results, such as j1.q, as alternatives to coordinate names."""
+"""Values that are given by the names of coordinates.
+
+Names of variables of FMUs and results, such as j1.q, are alternatives to the names of coordinates.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+import math
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
+from mbs.assembly.tables import Coordinate
 from mbs.errors import ModelError
+from mbs.numbers import numbers_given
 
 _KINDS = {
     "q": ("a position", "q0"),
@@ -60,3 +66,42 @@ def by_coordinate(
             )
         found[plain], given[plain] = value, str(name)
     return found
+
+
+# Angles that look like degrees although angles are in radians.
+
+
+_LARGEST = 20.0
+"""Angle [rad] of about three revolutions, beyond which a start without limits looks like degrees:
+designers write 30, 45 and 90 degrees, and few motions start after more revolutions."""
+_REVOLUTION = 2 * math.pi
+"""Angle [rad] beyond which a start outside the limits of its joint looks like degrees."""
+
+
+def like_degrees(coordinates: Iterable[Coordinate], given: object) -> str:
+    """Return a note on the angles that look like degrees; empty if none does.
+
+    Args:
+        coordinates: coordinates of the system.
+        given: positions by name; anything else gives no note.
+    """
+    if not isinstance(given, Mapping):
+        return ""
+    rows = {coordinate.name: coordinate for coordinate in coordinates}
+    numbers = {name: numbers_given(value) for name, value in given.items() if name in rows}
+    angles = {
+        name: float(number.ravel()[0])
+        for name, number in numbers.items()
+        if not isinstance(number, str) and number.size == 1
+    }
+    found = [f"{name} = {x:g}" for name, x in angles.items() if _looks_like_degrees(rows[name], x)]
+    return f"{', '.join(found)} rad may be degrees; give radians" if found else ""
+
+
+def _looks_like_degrees(coordinate: Coordinate, angle: float) -> bool:
+    if coordinate.unit != "rad":
+        return False
+    if coordinate.limits is None:
+        return abs(angle) > _LARGEST
+    low, high = coordinate.limits
+    return abs(angle) > _REVOLUTION and not low <= angle <= high

@@ -32,6 +32,7 @@ from mbs.closed_forms.raghavan_roth.numbers import (
     pair,
     rho,
 )
+from mbs.closed_forms.roots import Roots
 from mbs.solvers.homotopy import solved
 
 Complex = NDArray[np.complex128]
@@ -305,23 +306,8 @@ def certified_arm(arm: General) -> CertifiedArm:
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Configurations:
-    """Configurations that reach a pose.
-
-    Attributes:
-        q: (m, 6) configurations [rad or m].
-        proof: text on the certificate, as part of a phrase.
-        complete: whether the certificate proves that no configuration is missing.
-    """
-
-    q: Array
-    proof: str
-    complete: bool
-
-
-def certified_configurations(arm: CertifiedArm, T: Array) -> Configurations:
-    """Return the real configurations of a pose T (4, 4) [m], with their certificate."""
+def certified_configurations(arm: CertifiedArm, T: Array) -> Roots:
+    """Return the real configurations (m, 6) of a pose T (4, 4) [m], with their certificate."""
     own, found = arm.general.arm, general(arm.general, T)
     candidates = np.concatenate([complex_candidates(arm.general.prepared, T), found])
     roots = certified_roots(own, T, candidates)
@@ -339,7 +325,7 @@ def certified_configurations(arm: CertifiedArm, T: Array) -> Configurations:
     complete = certain + 2 * alone == arm.count > 0
     meet = f", and {2 * alone} where configurations meet" if alone and complete else ""
     proof = f"the general inverse geometric model, certified: {certain} of {arm.count} roots{meet}"
-    return Configurations(np.array(q).reshape(-1, 6), proof, complete)
+    return Roots(np.array(q).reshape(-1, 6), proof, complete)
 
 
 _SAME = 1e-6

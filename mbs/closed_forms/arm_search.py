@@ -33,20 +33,7 @@ def examine_arm(arm: Arm, T: Array, q: Array) -> tuple[Array, Array, Array]:
 # Merging of solutions for one pose that are the same configuration.
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Merged:
-    """Distinct solutions.
-
-    Attributes:
-        q: (m, n) configurations [rad or m].
-        hits: (m,) number of the given configurations that are equal to each.
-    """
-
-    q: Array
-    hits: NDArray[np.int64]
-
-
-def merged(arm: Arm, T: Array, q: Array) -> Merged:
+def merged(arm: Arm, T: Array, q: Array) -> tuple[Array, Numbers]:
     """Return the distinct solutions among several for one pose, in their order.
 
     Two solutions are the same if they are closer than 1e-9, or if they are closer than 1e-2 and
@@ -58,8 +45,11 @@ def merged(arm: Arm, T: Array, q: Array) -> Merged:
         arm: arm of the configurations.
         T: (4, 4) target pose.
         q: (m, n) solutions [rad or m].
+
+    Returns:
+        (k, n) distinct solutions, and (k,) the number of given solutions that are equal to each.
     """
-    return Merged(*core.merged_by(core.core_of(arm), arm, T, q))
+    return core.merged_by(core.core_of(arm), arm, T, q)
 
 
 def wrapped(arm: Arm, q: Array) -> Array:
@@ -89,12 +79,14 @@ def search(arm: Arm, T: Array, starts: int = 300, seed: int = SEED) -> Array:
     Returns:
         (m, n) distinct configurations [rad or m]; samples of a self-motion if one exists.
     """
-    return counted_search(arm, T, starts, seed).q
+    return counted_search(arm, T, starts, seed)[0]
 
 
-def counted_search(arm: Arm, T: Array, starts: int = 300, seed: int = SEED) -> Merged:
+def counted_search(
+    arm: Arm, T: Array, starts: int = 300, seed: int = SEED
+) -> tuple[Array, Numbers]:
     """Return the result of `search`, and the number of starts that converged to each solution."""
-    return Merged(*core.found_by(core.core_of(arm), arm, T, starts, seed))
+    return core.found_by(core.core_of(arm), arm, T, starts, seed)
 
 
 def random_configurations(arm: Arm, T: Array, count: int, seed: int) -> Array:
@@ -118,31 +110,22 @@ def _split_mix(seed: NDArray[np.uint64], indices: NDArray[np.uint64]) -> Array:
 # Configurations refined to rounding.
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Polished:
-    """Configurations and their distances from the target pose.
-
-    Attributes:
-        q: (m, n) configurations [rad or m]. Angles of improved configurations are in (-pi, pi].
-        residual: (m,) max |pose(q) - T| [m and 1].
-    """
-
-    q: Array
-    residual: Array
-
-
-def polish(arm: Arm, T: Array, q: Array) -> Polished:
+def polish(arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
     """Return the solutions near given configurations.
 
-    A configuration changes only if its residual decreases. An arm
-    of fewer than six joints gets a least-squares solution.
+    A configuration changes only if its residual decreases. An arm of fewer than six joints gets a
+    least-squares solution.
 
     Args:
         arm: arm of the configurations.
         T: (4, 4) target pose of all configurations, or (m, 4, 4) of each.
         q: (m, n) configurations [rad or m].
+
+    Returns:
+        (m, n) configurations [rad or m], with angles of improved ones in (-pi, pi], and (m,) their
+        residuals max |pose(q) - T| [m and 1].
     """
-    return Polished(*core.polished_by(core.core_of(arm), arm, T, q))
+    return core.polished_by(core.core_of(arm), arm, T, q)
 
 
 # Reachable pose nearest to a target pose.

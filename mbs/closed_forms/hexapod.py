@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mbs.closed_forms.roots import Roots
 from mbs.errors import LoopError
 from mbs.solvers import homotopy
 from mbs.solvers.homotopy import TOLERANCE, solved
@@ -370,30 +371,17 @@ _FOLD = 1e-2
 """Largest distance of t from 1 at the end of a path where two roots meet."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Poses:
-    """All poses of a platform.
-
-    Attributes:
-        e: (r, 4) unit quaternions, with a first element that is not negative.
-        p: (r, 3) positions of the platform frame [m].
-        proof: text on the certificate, for use within a sentence.
-        complete: whether the certificate proves that no pose is missing.
-    """
-
-    e: Real
-    p: Real
-    proof: str
-    complete: bool
-
-
-def poses(a: Real, b: Real, length: Real) -> Poses:
+def poses(a: Real, b: Real, length: Real) -> Roots:
     """Return all poses in which six legs have given lengths.
 
     Args:
         a: (6, 3) ends of the legs on the ground [m].
         b: (6, 3) ends on the platform, in its frame [m].
         length: (6,) lengths of the legs [m].
+
+    Returns:
+        Positions [m] of the platform frame, then unit quaternions with a first element that is not
+        negative, (r, 7).
 
     Raises:
         LoopError: the legs hold the platform at no pose.
@@ -421,7 +409,8 @@ def poses(a: Real, b: Real, length: Real) -> Poses:
             break
     meet = f", and {2 * found.folds} where poses meet" if found.folds else ""
     proof = f"homotopy, certified: {certain} of {expected} paths{meet}"
-    return Poses(found.e, found.p * size + middle - _rotations(found.e) @ own, proof, complete)
+    p = found.p * size + middle - _rotations(found.e) @ own
+    return Roots(np.concatenate([p, found.e], axis=1), proof, complete)
 
 
 def _rotations(e: Real) -> Real:

@@ -20,6 +20,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from mbs.closed_forms.roots import Roots
 from mbs.errors import LoopError, NoClosedForm
 from mbs.numbers import NONZERO
 from mbs.solvers.homotopy import follow, solved
@@ -105,24 +106,6 @@ class PlanarLoops:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PlanarRoots:
-    """All configurations of plane loops.
-
-    Attributes:
-        theta: (r, n) directions of the links [rad].
-        s: (r, m) displacements, divided by the size.
-        methods: solution methods, such as "Dixon's determinant of degree 6".
-        complete: whether no configuration is missing. False if an equation vanishes for all
-            directions, so that links may move by themselves, or if a path is lost.
-    """
-
-    theta: Real
-    s: Real
-    methods: tuple[str, ...]
-    complete: bool
-
-
 # Parts that can be solved alone: unknowns with enough rows that contain no other unknown.
 
 
@@ -160,21 +143,37 @@ class PlanarPart:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Found:
-    """Roots of a part, with the meaning of `PlanarRoots`."""
+class _PartRoots:
+    """Roots of a part.
+
+    Attributes:
+        theta: (r, n) directions of the links [rad].
+        s: (r, m) displacements, divided by the size.
+        method: solution method, such as "Dixon's determinant of degree 6".
+        complete: whether no root is missing. False if an equation vanishes for all directions, so
+            that links may move by themselves, or if a path is lost.
+    """
 
     theta: Real
     s: Real
     method: str
     complete: bool = True
 
+    @property
+    def values(self) -> Real:
+        """Directions, then displacements (r, n + m)."""
+        return np.concatenate([self.theta, self.s], axis=1)
 
-def planar_roots(loops: PlanarLoops) -> PlanarRoots:
+
+def planar_roots(loops: PlanarLoops) -> Roots:
     """Return all configurations that close the loops.
 
     Args:
         loops: closure rows. The number of independent rows is half the number of unknowns. Further
             dependent rows are allowed.
+
+    Returns:
+        Directions [rad], then displacements divided by the size, (r, n + m).
 
     Raises:
         NoClosedForm: a part needs more than eight unknowns.
@@ -182,11 +181,11 @@ def planar_roots(loops: PlanarLoops) -> PlanarRoots:
     """
     theta, s, parts = _solve(loops)
     theta, s, _ = refine(loops, theta, s)
-    methods = tuple(dict.fromkeys(part.method for part in parts))
-    return PlanarRoots(theta, s, methods, all(part.complete for part in parts))
+    proof = " and ".join(dict.fromkeys(part.method for part in parts))
+    return Roots(np.concatenate([theta, s], axis=1), proof, all(part.complete for part in parts))
 
 
-def _solve(loops: PlanarLoops) -> tuple[Real, Real, list[_Found]]:
+def _solve(loops: PlanarLoops) -> tuple[Real, Real, list[_PartRoots]]:
     """Return angles and displacements of all roots, and the results of the parts."""
     n, m = loops.counts
     if n + m == 0:
@@ -269,7 +268,7 @@ def _of_part(loops: PlanarLoops, part: PlanarPart) -> PlanarLoops:
     )
 
 
-def _irreducible(loops: PlanarLoops) -> _Found:
+def _irreducible(loops: PlanarLoops) -> _PartRoots:
     """Return the roots of a part that cannot be split further, and the solution method."""
     n, m = loops.counts
     if n + m == 1:
@@ -287,24 +286,24 @@ def _irreducible(loops: PlanarLoops) -> _Found:
     theta, s, residual = refine(loops, found.theta, found.s)
     kept = residual < _OPEN
     theta, s = _distinct(loops, theta[kept], s[kept], residual[kept])
-    return _Found(theta, s, found.method, found.complete)
+    return _PartRoots(theta, s, found.method, found.complete)
 
 
-def _one_unknown(loops: PlanarLoops) -> _Found:
+def _one_unknown(loops: PlanarLoops) -> _PartRoots:
     """Return the only direction or displacement of a row that is sufficient for two unknowns."""
     n, _ = loops.counts
     a = (loops.angles if n else loops.slides)[:, 0]
     value = -np.vdot(a, loops.constant) / np.vdot(a, a)
     if n:
-        return _Found(np.full((1, 1), np.angle(value)), np.zeros((1, 0)), "linear equations")
-    return _Found(np.zeros((1, 0)), np.full((1, 1), value.real), "linear equations")
+        return _PartRoots(np.full((1, 1), np.angle(value)), np.zeros((1, 0)), "linear equations")
+    return _PartRoots(np.zeros((1, 0)), np.full((1, 1), value.real), "linear equations")
 
 
 _AT_ZERO = 1e-6
 """Largest angle [rad] of the added direction in a valid root: at a fold it is accurate to 1e-7."""
 
 
-def _one_row_more(loops: PlanarLoops) -> _Found:
+def _one_row_more(loops: PlanarLoops) -> _PartRoots:
     """Return the roots of loops with one real equation too many, such as equal parallel cranks.
 
     A direction with random factors is added. At angle zero it does not change the loops.
@@ -315,7 +314,7 @@ def _one_row_more(loops: PlanarLoops) -> _Found:
     constant = loops.constant - added[:, 0]
     found = _irreducible(PlanarLoops(angles, loops.slides, loops.carriers, constant))
     kept = np.abs(found.theta[:, n]) < _AT_ZERO
-    return _Found(found.theta[kept, :n], found.s[kept], found.method, found.complete)
+    return _PartRoots(found.theta[kept, :n], found.s[kept], found.method, found.complete)
 
 
 # A dyad: one loop of two unknowns, by the law of cosines and similar quadratic equations.
@@ -327,7 +326,7 @@ stretched
 dyad: rounding of lengths relative to the size."""
 
 
-def _dyad(loops: PlanarLoops) -> _Found:
+def _dyad(loops: PlanarLoops) -> _PartRoots:
     """Return both roots of a single complex row with two unknowns."""
     method = "the quadratic equation of a dyad"
     n, _ = loops.counts
@@ -336,22 +335,22 @@ def _dyad(loops: PlanarLoops) -> _Found:
         a, c = loops.angles[0]
         first = _angles_of(np.conj(b) * a, (abs(c) ** 2 - abs(a) ** 2 - abs(b) ** 2) / 2)
         theta = [(t, np.angle(-(a * np.exp(1j * t) + b) / c)) for t in first]
-        return _Found(np.array(theta).reshape(-1, 2), np.zeros((len(theta), 0)), method)
+        return _PartRoots(np.array(theta).reshape(-1, 2), np.zeros((len(theta), 0)), method)
     if n == 0:
         D = np.stack([loops.slides[0].real, loops.slides[0].imag])
         s = np.linalg.solve(D, [-b.real, -b.imag])
-        return _Found(np.zeros((1, 0)), s[None], "linear equations")
+        return _PartRoots(np.zeros((1, 0)), s[None], "linear equations")
     a, d = loops.angles[0, 0], loops.slides[0, 0]
     # |a + d s| = |b| where the link carries the displacement, else |b + d s| = |a|
     begin, length = (b, abs(a)) if loops.carriers[0] == KNOWN else (a, abs(b))
     middle = -(np.conj(d) * begin).real / abs(d) ** 2
     square = (length**2 - abs(begin) ** 2) / abs(d) ** 2 + middle**2
     if square < -_FOLD:
-        return _Found(np.zeros((0, 1)), np.zeros((0, 1)), method)
+        return _PartRoots(np.zeros((0, 1)), np.zeros((0, 1)), method)
     s = middle + np.array([1, -1]) * np.sqrt(max(square, 0.0))
     moved = d * s
     unit = -(b + moved) / a if loops.carriers[0] == KNOWN else -b / (a + moved)
-    return _Found(np.angle(unit)[:, None], s[:, None], method)
+    return _PartRoots(np.angle(unit)[:, None], s[:, None], method)
 
 
 def _angles_of(w: complex, value: float) -> list[float]:
@@ -464,7 +463,7 @@ _APART = 1e-6
 """Relative distance above which two roots x count as different."""
 
 
-def dixon_roots(angles: Complex, constant: Complex) -> _Found:
+def dixon_roots(angles: Complex, constant: Complex) -> _PartRoots:
     """Return candidates for the directions that close loops of revolute joints.
 
     Args:
@@ -489,7 +488,7 @@ def dixon_roots(angles: Complex, constant: Complex) -> _Found:
     with np.errstate(all="ignore"):
         near = np.abs(np.log(np.abs(x))) < _NEAR_CIRCLE
     theta = [pencil.angles(x_k, t_k) for x_k, t_k in zip(x[near], t.T[near], strict=True)]
-    return _Found(
+    return _PartRoots(
         np.array(theta).reshape(-1, n),
         np.zeros((len(theta), 0)),
         f"Dixon's determinant of degree {max(degrees)}",
@@ -627,7 +626,7 @@ _TAIL = 1e-8
 """Relative size of coefficients above degree three: rounding of products of six lengths."""
 
 
-def triad_roots(loops: PlanarLoops) -> _Found:
+def triad_roots(loops: PlanarLoops) -> _PartRoots:
     """Return candidates for the unknowns of two loops with prismatic joints.
 
     Raises:
@@ -637,7 +636,7 @@ def triad_roots(loops: PlanarLoops) -> _Found:
     assert triad is not None  # tested by the caller
     angle, degree = triad.angles()
     theta, s = triad.unknowns(angle)
-    return _Found(theta, s, f"the polynomial of a triad, of degree {degree}")
+    return _PartRoots(theta, s, f"the polynomial of a triad, of degree {degree}")
 
 
 def _hidden(loops: PlanarLoops) -> _Triad | None:
@@ -899,7 +898,7 @@ def _start(links: bytes, count: int, carriers: tuple[int, ...]) -> tuple[_Rows, 
     return rows, x
 
 
-def path_roots(loops: PlanarLoops) -> _Found:
+def path_roots(loops: PlanarLoops) -> _PartRoots:
     """Return the unknowns of any loops, by path tracking from random loops.
 
     The paths first lead to random constants. The number of regular ends is the number of roots for
@@ -924,7 +923,7 @@ def path_roots(loops: PlanarLoops) -> _Found:
     folds = sum(not _is_near(x, real, n) for x in found)
     meet = f", and {2 * folds} where roots meet" if folds else ""
     method = f"homotopy, certified: {len(certain)} of {len(own)} paths{meet}"
-    return _Found(theta, s, method, len(certain) + 2 * folds == len(own))
+    return _PartRoots(theta, s, method, len(certain) + 2 * folds == len(own))
 
 
 def _is_near(x: Real, roots: Real, n: int) -> bool:

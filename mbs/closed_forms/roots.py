@@ -1,4 +1,4 @@
-"""Result of a closed form: each branch of a loop, as expressions of known quantities."""
+"""Solutions of loops: branches as expressions of known quantities, or numeric roots."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi
+import numpy as np
 from casadi import SX
+from numpy.typing import NDArray
 
 from mbs.components.joints import Motion
 from mbs.recursions.chain import ChainJoint
@@ -39,6 +41,21 @@ class LoopBranches:
 
     branches: Mapping[str, Positions]
     spin: RodSpin | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Roots:
+    """All numeric solutions of some loops, with a statement on their completeness.
+
+    Attributes:
+        values: (r, k) unknowns, one row per solution.
+        proof: text on the solution method and its certificate, for use within a sentence.
+        complete: whether the method proves that no solution is missing.
+    """
+
+    values: NDArray[np.float64]
+    proof: str
+    complete: bool = True
 
 
 def positions(joints: Sequence[ChainJoint], values: Sequence[SX]) -> Positions:

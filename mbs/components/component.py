@@ -329,6 +329,9 @@ def angle_expression(angle: Scalar, where: str) -> Expression:
 
 
 _NAME = re.compile(r"[^\s.'\"]+(?:\.[^\s.'\"]+)*")
+_NOT_IN_NAMES = re.compile(r"[\s.'\"]+")
+_LONGEST_NAME = 80
+"""Maximum length of a name from a file, equal to the length that messages quote."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -581,6 +584,14 @@ def with_points(component: C, change: Callable[[Point], Point]) -> C:
     new = {name: change_points(value) for name, value in values.items()}
     other = {name: value for name, value in new.items() if value is not values[name]}
     return replace(component, **other) if other else component
+
+
+def component_name(text: str) -> str:
+    """Return a valid component name: the text with blanks, dots and quotes replaced by underscores.
+
+    Invisible characters are removed, and the name is cut to 80 characters.
+    """
+    return seen(_NOT_IN_NAMES.sub("_", text.strip()))[:_LONGEST_NAME]
 
 
 # Pairs of coordinate name and number.

@@ -9,7 +9,15 @@ from types import MappingProxyType
 from typing import Any, ClassVar, TypeVar, overload
 
 from mbs.arguments import values_given
-from mbs.components.bodies import Mount, RigidBody, World, three
+from mbs.components.bodies import (
+    Mount,
+    Mounting,
+    RigidBody,
+    World,
+    mount_of,
+    notes_on_degrees,
+    three,
+)
 from mbs.components.component import (
     Component,
     Placement,
@@ -23,7 +31,6 @@ from mbs.components.drives import flange_pair
 from mbs.components.forces import Force
 from mbs.components.joints import Joint
 from mbs.components.motion_joint import MotionJoint
-from mbs.components.mounting import Mounting, mount_of, notes_on_degrees
 from mbs.components.notes import ImportNote
 from mbs.components.sensors import Sensor
 from mbs.components.shapes import Shape

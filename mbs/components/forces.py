@@ -17,6 +17,7 @@ from mbs.components import custom
 from mbs.components.bodies import three
 from mbs.components.component import Component, Point, SymbolTable, named_scalars
 from mbs.components.custom import At, Custom, Friction, Load, OneWay, RelativeMotion, Stop
+from mbs.components.joints import smooth_sign
 from mbs.components.on_points import OnPair
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, to_float, to_sx
@@ -746,27 +747,6 @@ def _half_turn(R: SX) -> tuple[SX, SX]:
     cosine = 0.5 * casadi.sqrt(1 + casadi.trace(R) + _HALF_REVOLUTION**2)
     axis = vector([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
     return axis / (4 * cosine), cosine
-
-
-# Smoothed sign of a velocity, for all laws of Coulomb friction without events.
-
-
-def smooth_sign(v: SX, width: SX) -> SX:
-    """Return the sign of velocities, smoothed as tanh(v / width), elementwise.
-
-    For a width of zero it is sign(v).
-
-    Args:
-        v: velocities [rad/s or m/s].
-        width: (1, 1) velocity over which the sign changes, a number or an expression. Its value may
-            be zero: derivatives stay finite.
-    """
-    if width.is_zero():
-        return casadi.sign(v)
-    if width.is_constant():
-        return casadi.tanh(v / width)
-    vanishes = width == 0
-    return casadi.if_else(vanishes, casadi.sign(v), casadi.tanh(v / (width + vanishes)))
 
 
 # Forces along a coordinate of a joint: stops at its limits, friction that depends on velocity.

@@ -801,3 +801,24 @@ class Fixed(Joint):
             pose: pose of frame_b relative to frame_a.
         """
         return diagonal(pose)
+
+
+# Smoothed sign of a velocity, for all laws of Coulomb friction without events.
+
+
+def smooth_sign(v: SX, width: SX) -> SX:
+    """Return the sign of velocities, smoothed as tanh(v / width), elementwise.
+
+    For a width of zero it is sign(v).
+
+    Args:
+        v: velocities [rad/s or m/s].
+        width: (1, 1) velocity over which the sign changes, a number or an expression. Its value may
+            be zero: derivatives stay finite.
+    """
+    if width.is_zero():
+        return casadi.sign(v)
+    if width.is_constant():
+        return casadi.tanh(v / width)
+    vanishes = width == 0
+    return casadi.if_else(vanishes, casadi.sign(v), casadi.tanh(v / (width + vanishes)))

@@ -15,7 +15,8 @@ from casadi import SX
 from mbs.components import custom
 from mbs.components.custom import At, Friction, Load, OneWay, Row, Stop
 from mbs.components.drives import OneFlange, TwoFlanges
-from mbs.components.forces import one_sided_damping, smooth_ramp, smooth_sign
+from mbs.components.forces import one_sided_damping, smooth_ramp
+from mbs.components.joints import smooth_sign
 from mbs.errors import DescriptionError
 from mbs.expressions import to_float
 

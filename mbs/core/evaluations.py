@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -33,8 +33,10 @@ def work_sizes(library: ctypes.CDLL, name: str) -> tuple[int, ...]:
     return tuple(size.value for size in sizes)
 
 
-def compiled_evaluation(function: Function, library: ctypes.CDLL) -> Any:
-    """Return an object by which algorithms in C evaluate machine code.
+def compiled_evaluation(function: Function, library: ctypes.CDLL) -> Callable[[], Any]:
+    """Return a callable that makes objects by which algorithms in C evaluate machine code.
+
+    Each object has scratch memory of its own, and serves one algorithm at a time.
 
     Args:
         function: the function, with all inputs and outputs.
@@ -43,7 +45,7 @@ def compiled_evaluation(function: Function, library: ctypes.CDLL) -> Any:
     name = function.name()
     ports = function.n_in(), function.n_out()
     address = code_address(library, name)
-    return core_library().compiled(address, ports, work_sizes(library, name))
+    return partial(core_library().compiled, address, ports, work_sizes(library, name))
 
 
 def interpreted_evaluation(function: Function, examine: Callable[[BaseException], None]) -> Any:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import Any, cast
 
 import casadi
 import numpy as np
@@ -17,13 +16,15 @@ from mbs.assembly import System
 from mbs.assembly.model_function import ModelFunction
 from mbs.errors import ExportError, ModelError
 from mbs.export.c_check import NO_FAST_MATH, STATUS, StatusCheck, check_of
+from mbs.export.c_options import CLibraryArguments, CLibraryOptions, Functions, Model
 from mbs.export.c_step import StepTexts, step_texts
 from mbs.files import path_of, write_texts
 from mbs.native._compiled import generated, require_function, require_names, unwritten
 from mbs.native.c_code import Real, literal
 from mbs.native.frames import NOINLINE
 from mbs.native.handwritten import handwritten_text, names_declared
-from mbs.native.scalar_source import Target, bare_source
+from mbs.native.scalar_source import bare_source
+from mbs.options import arguments_of, faults, group_values
 from mbs.text import in_c_comment, quoted
 
 # Names that are reserved in C, C++ and CMake.
@@ -222,18 +223,9 @@ _LARGEST: dict[Real, tuple[str, str]] = {
 _FEW = 64
 """Largest number of values that one sum checks for NaN. If the sum overflows, each is checked."""
 
-Model = Function | System
-Functions = Model | Sequence[Model] | Mapping[str, Model]
 
-
-def c_library(
-    functions: Functions,
-    folder: str | os.PathLike[str],
-    *,
-    target: Target = "hosted",
-    real: Real = "double",
-    checked: bool = True,
-) -> Path:
+@arguments_of(CLibraryArguments)
+def c_library(options: CLibraryArguments) -> Path:
     """Write models as portable C source.
 
     The folder contains `NAME.c` (generated code and wrappers), `NAME.h` (a documented prototype for
@@ -258,15 +250,7 @@ def c_library(
     `-ffp-contract=off` of GCC and clang), results equal `mbs.export.fmu(system, solver="rk4")`.
 
     Args:
-        functions: models of one or several systems with distinct names, or dict from name in C to
-            model. Systems too with target="bare".
-        folder: folder to write to. It is created if it does not exist. Files that mbs wrote are
-            replaced.
-        target: "hosted", or "bare" for systems without an operating system.
-        real: type of numbers of a bare library: "double" or "float". In single precision, loops
-            may be open by 1e-5 of the size of the mechanism, because positions round to 6e-8.
-        checked: whether calls are checked. If False, a call returns 0 for all inputs, also if the
-            model is not valid there. Steps are always checked.
+        options: see `CLibraryArguments`.
 
     Returns:
         Path of the folder.
@@ -277,11 +261,11 @@ def c_library(
         ModelError: a name is invalid, a function cannot be written as C, or a system has events,
             which steps of a fixed length cannot locate.
     """
-    place = path_of(folder)
-    library = _library(place, target, real, checked)
-    entries, systems = _entries(functions, str(place), library)
+    place = path_of(options.folder)
+    library = _library(place, options)
+    entries, systems = _entries(options.functions, str(place), library)
     steps = {
-        name: step_texts(system, name, library.name, real, _MARK)
+        name: step_texts(system, name, library.name, library.real, _MARK)
         for name, system in systems.items()
     }
     files = {
@@ -303,20 +287,15 @@ def c_library(
 
 
 @dataclass(frozen=True, slots=True)
-class _Library:
-    """Settings of a library.
-
-    Attributes:
-        name: name of the files.
-        bare: whether the code is for systems without an operating system.
-        real: type of numbers.
-        checked: whether calls are checked.
-    """
+class _Library(CLibraryOptions):
+    """Options of a library, and the name of its files."""
 
     name: str
-    bare: bool
-    real: Real
-    checked: bool
+
+    @property
+    def bare(self) -> bool:
+        """Whether the code is for systems without an operating system."""
+        return self.target == "bare"
 
     @property
     def type(self) -> str:
@@ -324,15 +303,13 @@ class _Library:
         return f"{self.name}_real" if self.bare else "double"
 
 
-def _library(place: Path, target: object, real: object, checked: bool) -> _Library:
-    if target not in get_args(Target):
-        raise ExportError(f"{place}: target is {quoted(target)}; use 'hosted' or 'bare'")
-    if real not in get_args(Real):
-        raise ExportError(f"{place}: real is {quoted(real)}; use 'double' or 'float'")
-    if real == "float" and target != "bare":
+def _library(place: Path, options: CLibraryOptions) -> _Library:
+    for sentence in faults(options):
+        raise ExportError(f"{place}: {sentence}")
+    if options.real == "float" and options.target != "bare":
         raise ExportError(f"{place}: real='float' is for bare libraries; add target='bare'")
     name = library_name(place.resolve().name)
-    return _Library(name, target == "bare", cast("Real", real), bool(checked))
+    return _Library(name, **group_values(options, CLibraryOptions))
 
 
 @dataclass(frozen=True, slots=True)

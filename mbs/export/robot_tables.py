@@ -25,7 +25,6 @@ from mbs.components.joints import Motion
 from mbs.errors import ModelError
 from mbs.expressions import to_sx
 from mbs.formats import CutRow, FrameRow, InertiaRow, RobotTable
-from mbs.formats.base_pose import POSE, base_pose_texts
 from mbs.formats.link_table import (
     Array,
     FileCoupling,
@@ -38,10 +37,10 @@ from mbs.formats.link_table import (
 )
 from mbs.formats.mjcf.writer import is_identity
 from mbs.formats.rotations import inverse
-from mbs.formats.table import BODY_SCALARS, GEOMETRY
+from mbs.formats.table import BODY_SCALARS, GEOMETRY, POSE, base_pose_texts
 from mbs.formats.urdf.shared import GRAVITY
 from mbs.operations.graph import graph_of
-from mbs.recursions.poses import link_poses
+from mbs.recursions.link_motions import link_poses
 from mbs.recursions.route import relative_pose
 from mbs.spatial import Khalil, Pose, align_z, frames_to, origin
 from mbs.spatial.inertia import TEN_PARAMETERS

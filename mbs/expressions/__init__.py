@@ -18,18 +18,18 @@ from mbs.expressions._expression import (
     Parameter,
     Scalar,
     expression,
+    number,
     operation,
     out_of_bounds,
-)
-from mbs.expressions.evaluate import (
     parameters_of,
+    plain_numbers,
     renamed,
     to_float,
     to_sx,
+    whole_number,
     with_values,
     without_defaults,
 )
-from mbs.expressions.numbers import number, plain_numbers, whole_number
 
 __all__ = [
     "MORE_THAN_ZERO",

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import re
 import sys
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
+import casadi
 import numpy as np
-from casadi import DM
+from casadi import DM, SX
 
 from mbs.errors import ExpressionError
 from mbs.text import quoted
@@ -485,3 +486,204 @@ class _Parser:
         if len(arguments) != FUNCTIONS[name]:
             self.fail(f"{name} takes {FUNCTIONS[name]} argument(s), not {len(arguments)}")
         return operation(name, *arguments)
+
+
+# Values and parameters of expressions.
+
+
+T = TypeVar("T")
+
+
+def parameters_of(value: Expression) -> Iterator[Parameter]:
+    """Yield the parameters of an expression in the order of the text, including repetitions.
+
+    Args:
+        value: expression.
+    """
+    if isinstance(value, Parameter):
+        yield value
+    elif isinstance(value, Operation):
+        for argument in value.arguments:
+            yield from parameters_of(argument)
+
+
+def renamed(value: Expression, prefix: str) -> Expression:
+    """Return the expression with a prefix on every parameter name: `L2` becomes `prefix.L2`.
+
+    Args:
+        value: expression.
+        prefix: text before the names, without the dot.
+    """
+    if isinstance(value, Parameter):
+        return replace(value, name=f"{prefix}.{value.name}")
+    if isinstance(value, Operation):
+        return replace(value, arguments=tuple(renamed(a, prefix) for a in value.arguments))
+    return value
+
+
+def without_defaults(value: Expression) -> Expression:
+    """Return the expression with parameters that have no default value.
+
+    Args:
+        value: expression.
+    """
+    if isinstance(value, Parameter):
+        return replace(value, default=None)
+    if isinstance(value, Operation):
+        return replace(value, arguments=tuple(map(without_defaults, value.arguments)))
+    return value
+
+
+def with_values(value: Expression, values: Mapping[str, float]) -> Expression:
+    """Return the expression with numbers in place of the parameters with known values.
+
+    The default of a parameter is its value if `values` does not contain it.
+
+    Args:
+        value: expression.
+        values: value by parameter name. Parameters without value and default remain.
+
+    Raises:
+        ExpressionError: the expression has no finite value.
+    """
+    if isinstance(value, Parameter):
+        known = values.get(value.name, value.default)
+        return value if known is None else Number(known)
+    if isinstance(value, Operation):
+        return operation(value.operator, *(with_values(a, values) for a in value.arguments))
+    return value
+
+
+def to_sx(value: Scalar, symbols: Mapping[str, SX]) -> SX:
+    """Return a number, text or expression as a CasADi expression.
+
+    Args:
+        value: number, text or expression.
+        symbols: CasADi scalar of each parameter, by parameter name.
+
+    Raises:
+        KeyError: a parameter is not in `symbols`.
+    """
+    return _fold(expression(value), SX, lambda p: symbols[p.name], _apply_sx)
+
+
+def to_float(value: Scalar, values: Mapping[str, float] | None = None) -> float | None:
+    """Return the value of a number, text or expression.
+
+    None if a parameter has no value, or if the result is not finite, such as 1/A with A = 0.
+
+    Args:
+        value: number, text or expression.
+        values: value by parameter name; the default of a parameter is used if it is not contained.
+    """
+    known = values or {}
+
+    def symbol(parameter: Parameter) -> float:
+        given = known.get(parameter.name, parameter.default)
+        return math.nan if given is None else given
+
+    result = _fold(expression(value), float, symbol, apply_float)
+    return result if math.isfinite(result) else None
+
+
+def _fold(
+    value: Expression,
+    number: Callable[[float], T],
+    symbol: Callable[[Parameter], T],
+    apply: Callable[[str, list[T]], T],
+) -> T:
+    """Evaluate an expression bottom-up in a type T.
+
+    `number` converts numbers, `symbol` converts parameters, and `apply` evaluates an operator (by
+    its name) on operands of the type T.
+    """
+    if isinstance(value, Number):
+        return number(value.value)
+    if isinstance(value, Parameter):
+        return symbol(value)
+    assert isinstance(value, Operation)
+    return apply(value.operator, [_fold(a, number, symbol, apply) for a in value.arguments])
+
+
+def _apply_sx(operator: str, values: list[SX]) -> SX:
+    """Return the result of an operator or function, by its name, on CasADi scalars."""
+    result = arithmetic(operator, values)
+    return SX(getattr(casadi, operator)(*values) if result is None else result)
+
+
+# Numbers in text, by one rule for files, tables, the command line and the page.
+#
+# A number is a text of the grammar without symbols, such as 0.3 or pi/2. Formats whose own tools
+# accept digits only use plain numbers. Infinite numbers are errors.
+
+
+_PLAIN = re.compile(rf"[-+]?{NUMBER}", re.ASCII)
+
+
+def number(value: Scalar, where: str) -> float:
+    """Return the value of a number, of its text, or of an expression with known symbols.
+
+    Args:
+        value: number, text or expression as the user wrote it.
+        where: name of the file, field or option, for the error message.
+
+    Raises:
+        ExpressionError: the text is not in the grammar, a symbol has no value, or the value is
+            True or False.
+    """
+    found = _find(value, where)
+    if found is None:
+        raise ExpressionError(
+            f"{where}: {_given(value)} is not a number; write one, such as 0.3 or pi/2"
+        )
+    return found
+
+
+def whole_number(value: Scalar, where: str) -> int:
+    """Return the value of a whole number, of its text, or of an expression with known symbols.
+
+    Args:
+        value: number, text or expression as the user wrote it.
+        where: name of the file, field or option, for the error message.
+
+    Raises:
+        ExpressionError: the text is not in the grammar, a symbol has no value, or the value is not
+            whole.
+    """
+    found = _find(value, where)
+    if found is None or not found.is_integer():
+        raise ExpressionError(f"{where}: {_given(value)} is not a whole number; write one")
+    return int(found)
+
+
+def _find(value: Scalar, where: str) -> float | None:
+    """Return the value; None for True, False, unknown symbols and values that are not finite.
+
+    `where` is named in the message of the ExpressionError that a wrong text raises.
+    """
+    return None if isinstance(value, bool) else to_float(expression(value, where))
+
+
+def _given(value: Scalar) -> str:
+    """Return the text of the value for error messages, in quotation marks."""
+    return quoted(str(value) if isinstance(value, Expression) else value)
+
+
+def plain_numbers(text: str, count: int, where: str) -> tuple[float, ...]:
+    """Return numbers that are written in digits and separated by blanks.
+
+    Args:
+        text: text as the user wrote it.
+        count: required number of numbers.
+        where: name of the file, field or option, for the error message.
+
+    Raises:
+        ExpressionError: the text is not exactly `count` finite numbers.
+    """
+    words = text.split()
+    values = tuple(float(word) for word in words if _PLAIN.fullmatch(word))
+    if not len(values) == len(words) == count or not all(map(math.isfinite, values)):
+        raise ExpressionError(
+            f"{where}: {quoted(text)} is not {count} finite number(s); correct it"
+        )
+    return values

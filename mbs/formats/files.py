@@ -1,22 +1,20 @@
-"""Reading of bytes and texts from files, and conversion of names to component names."""
+"""Reading of bytes and texts from robot files, and the notes on them."""
 
 from __future__ import annotations
 
 import codecs
 import io
-import re
 import stat
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from mbs.components.notes import ImportNote, NoteKind
 from mbs.errors import DescriptionError
-from mbs.text import quoted, seen
+from mbs.text import quoted
 
 LARGEST_FILE = 64_000_000
 """Maximum number of bytes of a file; the largest robot descriptions have a few millions."""
-LONGEST_NAME = 80
-"""Maximum length of a name, equal to the length that messages quote."""
 
-_NOT_IN_NAMES = re.compile(r"[\s.'\"]+")
 _MARKS = {
     codecs.BOM_UTF8: "utf-8-sig",
     codecs.BOM_UTF16_LE: "utf-16",
@@ -75,9 +73,38 @@ def decoded(content: bytes, encoding: str = "utf-8") -> str:
     return content.decode(encoding, errors="replace")
 
 
-def component_name(text: str) -> str:
-    """Return a valid component name: the text with blanks, dots and quotes replaced by underscores.
+# Import notes of the file readers. In strict mode each note is an error.
 
-    Invisible characters are removed, and the name is cut to `LONGEST_NAME` characters.
+
+@dataclass(slots=True)
+class Notes:
+    """Collection of the import notes of one file.
+
+    Attributes:
+        path: path of the file, for error messages.
+        strict: whether to raise an error instead of adding a note.
+        lines: whether line numbers refer to the file; False for a text that was generated from it.
+        taken: the notes, in reading order.
     """
-    return seen(_NOT_IN_NAMES.sub("_", text.strip()))[:LONGEST_NAME]
+
+    path: str
+    strict: bool = False
+    lines: bool = True
+    taken: list[ImportNote] = field(default_factory=list)
+
+    def add(self, kind: NoteKind, element: str, text: str, line: int | None = None) -> None:
+        """Add a note.
+
+        Args:
+            kind: kind of the note.
+            element: element of the file, such as "link 'base'".
+            text: text in the file and its interpretation.
+            line: line number in the file.
+
+        Raises:
+            DescriptionError: `strict` is True.
+        """
+        note = ImportNote(kind, element, text, line if self.lines else None)
+        if self.strict:
+            raise DescriptionError(f"{self.path}: {note}; correct the file or read it not strictly")
+        self.taken.append(note)

@@ -10,7 +10,7 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from mbs.components.shapes import is_mesh_file
-from mbs.formats.notes import Notes
+from mbs.formats.files import Notes
 from mbs.text import quoted
 
 _PACKAGE = re.compile(r"(?:package|model)://([^/\\]+)/+(.+)", re.DOTALL)

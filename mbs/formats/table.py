@@ -6,11 +6,13 @@ given expressions without evaluation.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 import numpy as np
+from casadi import DM, SX
+from numpy.typing import NDArray
 
 from mbs.components import (
     Cylindrical,
@@ -26,11 +28,12 @@ from mbs.components import (
     Spherical,
     Universal,
 )
+from mbs.components.bodies import mount_of
+from mbs.components.component import Placement, component_name
 from mbs.components.joints import motor_range
+from mbs.components.notes import ImportNote
 from mbs.errors import DescriptionError
 from mbs.expressions import Expression, Number, Scalar, expression, number, parameters_of, to_float
-from mbs.formats.base_pose import base_placement
-from mbs.formats.files import component_name
 from mbs.mechanism import Mechanism
 from mbs.spatial.inertia import TEN_PARAMETERS
 from mbs.text import did_you_mean, quoted
@@ -547,3 +550,44 @@ def _check_base(table: RobotTable) -> None:
                 f"{table.name}: {key} is {list(table.extras[key])}, but the base of a table does"
                 " not move; set it to zero and put a free joint under the robot instead"
             )
+
+
+# Pose of the base in the world, as the vector Z of robot files of SYMORO and of tables.
+
+
+Array = NDArray[np.float64]
+
+POSE = "Z"
+"""Name of the vector: the elements of a (4, 4) homogeneous matrix, row by row."""
+
+
+def base_pose_texts(pose: Array) -> tuple[str, ...]:
+    """Return the texts of the vector for a pose (4, 4)."""
+    return tuple(repr(float(value) + 0.0) for value in np.ravel(pose))
+
+
+def placement_pose(placement: Placement, values: Mapping[str, float]) -> Array | None:
+    """Return the pose (4, 4) of a mount; None if one of its symbols has no value."""
+    names = {symbol.name for value in placement.expressions() for symbol in parameters_of(value)}
+    if not names <= set(values):
+        return None
+    found = placement.pose({name: SX(float(values[name])) for name in names}).matrix
+    pose = np.array(DM(found))
+    return pose if np.isfinite(pose).all() else None
+
+
+def base_placement(extras: Mapping[str, Sequence[str]]) -> tuple[Placement, list[ImportNote]]:
+    """Return the mount that a table contains, and a note if its vector is no pose in numbers."""
+    texts = extras.get(POSE, ())
+    values = [to_float(expression(text)) for text in texts]
+    if not texts or values == np.eye(4).ravel().tolist():
+        return Placement(), []
+    try:
+        T: Any = np.reshape(np.array(values, dtype=float), (4, 4))
+        if not np.array_equal(T[3], [0, 0, 0, 1]):
+            raise ValueError
+        mount = {"position": T[:3, 3].tolist(), "rotation": T[:3, :3].tolist()}
+        return Placement(mount_of(mount, POSE)[0]), []
+    except (ValueError, TypeError, DescriptionError):
+        what = "is no pose of the base in numbers; the base has no mount"
+        return Placement(), [ImportNote("ignored", f"vector {POSE}", what)]

@@ -19,8 +19,7 @@ from xml.parsers import expat
 
 from mbs.errors import DescriptionError
 from mbs.files import path_of, write_bytes
-from mbs.formats.files import decoded, read_bytes
-from mbs.formats.notes import Notes
+from mbs.formats.files import Notes, decoded, read_bytes
 
 _MOST_ELEMENTS = 1_000_000  # limit of memory: a file of the largest size could have 16 times more
 _DEEPEST = 200  # maximum nesting of elements; robot files have about ten levels

@@ -36,8 +36,10 @@ from mbs.identification.observations import (
     stacked,
     with_regular,
 )
-from mbs.identification.record import Record, Samples, smoothed
+from mbs.identification.options import IdentifyArguments
+from mbs.identification.record import Record
 from mbs.identification.regressors import INERTIAL, Joints, regressor
+from mbs.options import arguments_of
 from mbs.progress import progress
 from mbs.text import did_you_mean, quoted
 
@@ -298,20 +300,8 @@ class Identification:
         return self.bodies
 
 
-def identify(
-    system: System,
-    record: Record | Sequence[Record],
-    bandwidth: float,
-    method: str = "weighted",
-    *,
-    equations: str = "dynamic",
-    smoothing: Callable[[Record, float], Samples] = smoothed,
-    rotors: bool = True,
-    offsets: bool = False,
-    couplings: Sequence[Joints] = (),
-    prior: Prior | None = None,
-    quiet: bool = False,
-) -> Identification:
+@arguments_of(IdentifyArguments)
+def identify(options: IdentifyArguments) -> Identification:
     """Identify the parameters of a system from one or more records of its motion.
 
     Each record is filtered separately and its ends are dropped; the equations of all records are
@@ -321,35 +311,24 @@ def identify(
     Source: Khalil & Dombre 2002, chapter 12; Wensing, Kim & Slotine 2018 for bodies.
 
     Args:
-        system: geometry and friction law. Its inertial and friction parameters are not used.
-        record: record of all joints, or of the independent joints of a closed system; or a list of
-            records of the same joints.
-        bandwidth: bandwidth of the filters [Hz], five to ten times the highest frequency of the
-            motion.
-        method: estimation method of the base parameters: "least_squares", "weighted", "reweighted",
-            "robust", "instrumental" or "consistent".
-        equations: identification model: "dynamic" (efforts), "filtered" or "energy". The last two
-            need no accelerations.
-        smoothing: `smoothed`, or `smoothed_with_velocity` to use measured velocities.
-        rotors: option of `columns_of`.
-        offsets: option of `columns_of`.
-        couplings: option of `columns_of`.
-        prior: prior knowledge of the bodies; its guess is in the order of the columns.
-        quiet: whether to hide the progress bar.
+        options: see `IdentifyArguments`.
 
     Raises:
         ModelError: the method is unknown, or a base parameter is not identifiable from the record.
         SolverError: the estimation of the base parameters did not converge.
     """
-    _check(system, method, equations, smoothing)
-    records = _records(system, record, bandwidth)
-    known, options = prior or Prior(), _options(rotors, offsets, couplings)
-    with progress(f"{system.name}: identification", 0.0, 1.0, quiet=quiet) as reached:
-        D = regressor(system, **options)
+    system, bandwidth, method = options.system, options.bandwidth, options.method
+    _check(system, method, options.equations, options.smoothing)
+    records = _records(system, options.record, bandwidth)
+    known = options.prior or Prior()
+    chosen = _options(options.rotors, options.offsets, options.couplings)
+    with progress(f"{system.name}: identification", 0.0, 1.0, quiet=options.quiet) as reached:
+        D = regressor(system, **chosen)
         base = base_parameters(system, columns=D.columns)
         reached(_MODEL_DONE)
-        samples = tuple(with_regular(D, smoothing(one, bandwidth)) for one in records)
-        full = stacked([EQUATIONS[equations](system, s, bandwidth, options) for s in samples])
+        samples = tuple(with_regular(D, options.smoothing(one, bandwidth)) for one in records)
+        equations = EQUATIONS[options.equations]
+        full = stacked([equations(system, s, bandwidth, chosen) for s in samples])
         grouped = full.grouped(base)
         reached(_EQUATIONS_DONE)
         physical = physically_consistent if method == "least_squares" else consistent_weighted

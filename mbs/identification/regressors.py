@@ -24,6 +24,13 @@ from mbs.models.symbols import (
     symbols_of,
 )
 from mbs.recursions.force_elements import element_efforts
+from mbs.recursions.link_motions import (
+    Acceleration,
+    LinkPose,
+    Velocity,
+    link_accelerations,
+    link_velocities,
+)
 from mbs.recursions.newton_euler import (
     rotor_and_friction,
     rotor_efforts,
@@ -31,7 +38,6 @@ from mbs.recursions.newton_euler import (
     spring_effort,
 )
 from mbs.recursions.parts import PartsAt
-from mbs.recursions.poses import LinkPose
 from mbs.recursions.regressor import (
     PathTwist,
     inertial_energy,
@@ -42,7 +48,6 @@ from mbs.recursions.regressor import (
     position_regressor,
     work,
 )
-from mbs.recursions.velocities import Acceleration, Velocity, link_accelerations, link_velocities
 from mbs.spatial import zeros
 from mbs.text import did_you_mean, quoted
 

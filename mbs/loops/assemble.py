@@ -8,10 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from mbs.assembly import System
-from mbs.assembly.degrees import like_degrees
 from mbs.assembly.open_system import open_system
 from mbs.assembly.parts import guesses_of_unknowns
-from mbs.assembly.variable_names import GUESSES
+from mbs.assembly.variable_names import GUESSES, like_degrees
 from mbs.components import Description
 from mbs.errors import AssemblyError, Unclosable
 from mbs.loops.analysis import analyse

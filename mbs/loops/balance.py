@@ -29,10 +29,9 @@ from mbs.components.custom import Friction, OneWay, Row, Stop
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
 from mbs.recursions.force_elements import element_efforts
+from mbs.recursions.link_motions import link_poses, resting_base
 from mbs.recursions.newton_euler import joint_efforts, newton_euler
 from mbs.recursions.parts import PartsAt
-from mbs.recursions.poses import link_poses
-from mbs.recursions.velocities import resting_base
 from mbs.solvers.block_triangular import solve_large
 from mbs.solvers.rank import independent_rows, rank
 from mbs.text import listed
@@ -260,11 +259,18 @@ def _obstacle(system: System, part: ComponentInstance, velocity: int) -> str:
     """
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     if part.element.has("stops"):
-        return "which locks and releases"
+        return "which locks and releases a mass only: give the node a mass"
     if part.element.has("frictions"):
+        laws = part.element.frictions(PartsAt(system, q, v).at(part)).values()
+        if not all(map(_sticks_as_it_slides, laws)):
+            return (
+                "which needs sticking = sliding, since without mass the velocity would jump when"
+                " sliding begins: give equal limits, or give the node a mass"
+            )
         return (
-            "which needs viscous damping of the node alone, such as Fv of its joint, and sticking ="
-            " sliding; a SpringFrictionSeries has a spring and friction alone"
+            "which needs viscous damping of the node alone, such as Fv of its joint, since friction"
+            " gives a force and no velocity: add damping, or replace the friction and a spring on"
+            " the node by a SpringFrictionSeries"
         )
     if not part.element.acts:
         return ""

@@ -8,7 +8,7 @@ or a platform on six legs. The block takes the position of a stage, and the plan
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 from typing import NamedTuple
 
@@ -36,6 +36,7 @@ from mbs.closed_forms.ring import (
     independent_indices,
     loop_links,
 )
+from mbs.closed_forms.roots import Roots
 from mbs.components import Fixed, PointOnLine, Rod, Spherical
 from mbs.components.joints import Freedom, Motion
 from mbs.errors import LoopError, NoClosedForm
@@ -44,7 +45,6 @@ from mbs.loops.closing import Vector, closure_parameters, difference
 from mbs.loops.plan import (
     LoopBlock,
     PlanWork,
-    Roots,
     Stage,
     is_bound,
     order_steps,
@@ -468,9 +468,9 @@ class _Plane:
                 f"{self.system.name}: loops that are plane elsewhere are not so here"
             )
         found = planar_roots(drawing.loops)
-        values = drawing.positions(found.theta, found.s)
-        proof = " and ".join(found.methods)
-        return Roots(values, proof, found.complete)
+        n = drawing.loops.counts[0]
+        values = drawing.positions(found.values[:, :n], found.values[:, n:])
+        return replace(found, values=values)
 
 
 @dataclass(slots=True)
@@ -831,8 +831,8 @@ class _SingleLoop:
         signs = np.array([joint.sign for joint in self.joints])
         n = len(self.joints)
         found = certified_configurations(self._arm(gaps), inverse(gaps[0]))
-        q = found.q[np.all(np.abs(found.q[:, n:]) < _AT_ZERO, axis=1), :n]
-        return Roots(q * signs, found.proof, found.complete)
+        q = found.values[np.all(np.abs(found.values[:, n:]) < _AT_ZERO, axis=1), :n]
+        return replace(found, values=q * signs)
 
     def is_locked(self, q: Vector, p: Vector) -> bool:
         """Whether known positions fix all joints of the loop (all its solutions are regular)."""
@@ -1146,10 +1146,10 @@ class _Hexapod:
             np.array([leg.length for leg in legs]),
         )
         indices, values = list(self.indices), list[Vector]()
-        for e, place in zip(found.e, found.p, strict=True):
+        for pose in found.values:
             whole = np.zeros(self.extent)
             whole[: self.system.nq] = q[: self.system.nq]
-            whole[-7:] = [*place, *e]
+            whole[-7:] = pose
             for stage, branch in zip(self.stages, self.chosen, strict=True):
                 whole[list(stage.indices)] = np.array(stage.values(whole, p))[:, branch]
             values.append(whole[indices])

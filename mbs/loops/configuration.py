@@ -7,10 +7,9 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 import numpy as np
 
 from mbs.assembly import System
-from mbs.assembly.degrees import like_degrees
 from mbs.assembly.model_function import require_system
 from mbs.assembly.validity import plain_fault
-from mbs.assembly.variable_names import GUESSES, POSITIONS, VELOCITIES
+from mbs.assembly.variable_names import GUESSES, POSITIONS, VELOCITIES, like_degrees
 from mbs.errors import LoopError, ModelError, Unclosable
 from mbs.loops._function import configuration_on, fixed_positions, independent_names
 from mbs.loops.balance import GROUP

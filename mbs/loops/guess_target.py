@@ -106,6 +106,15 @@ class GuessTarget:
         cut = self.system.cut_coordinates
         return np.concatenate([own, row_difference(cut, self._at_cut(q), self._at_cut(other))])
 
+    def signed_positions(self, q: Vector) -> Vector:
+        """Return all positions at q (nq,); the first nonzero element of quaternions is positive."""
+        found = q if self.cut is None else np.concatenate([q, self._at_cut(q)])
+        found = np.array(found, dtype=float)
+        for first in [k for k, row in enumerate(self.rows) if row.kind == "quaternion"][::4]:
+            part = slice(first, first + 4)
+            found[part] *= np.sign(next((x for x in found[part] if abs(x) > EQUAL), 1.0))
+        return found
+
     def _at_cut(self, q: Vector) -> Vector:
         """Return the positions (c,) of the cut joints at q (nq,) [rad, m or 1]."""
         return cut_positions_and_slopes(self.system)(q, self.p)[0].ravel()

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.assembly.tree import quaternion_slices
 from mbs.closed_forms.ring import extent, independent_indices, spin_indices
+from mbs.closed_forms.roots import Roots
 from mbs.components.joints import Motion
 from mbs.errors import LoopError, ModelError
 from mbs.loops._function import Given, independent_positions
@@ -27,7 +29,7 @@ from mbs.loops.closing import (
     difference,
     within_half_turn,
 )
-from mbs.loops.plan import Roots, Stage, every_configuration
+from mbs.loops.plan import Stage, every_configuration
 from mbs.loops.pose import Goal, goal
 from mbs.solvers.rank import rank
 from mbs.text import quoted
@@ -134,10 +136,14 @@ def _checked(system: System, q: Vector, branch: tuple[str, ...], p: Vector) -> M
     residual = 0.0
     if system.is_closed:
         closing = Closing(system, p)
-        residual = float(np.max(np.abs(closing.rows(q)[0]), initial=0.0))
+        residual = _largest_row(closing.rows(q)[0])
         if closing.openness(q) > CLOSED or not closing.faces(q):
             return None
     return Mode(tuple(float(x) for x in q), branch, residual)
+
+
+def _largest_row(rows: Vector) -> float:
+    return float(np.max(np.abs(rows), initial=0.0))
 
 
 def _same(mode: Mode, other: Mode) -> bool:
@@ -188,19 +194,13 @@ def _of_blocks(system: System, steps: Sequence[Step], start: Vector, p: Vector) 
     if not complete:
         more = list[Mode | None]()
         # a mode that can move raises here; otherwise the search would find infinitely many
-        for q in _closed_configurations(closing, start[: system.nq]):
-            if not any(_near(system, q, mode) for mode in found):
+        for q in closed_configurations(closing, start[: system.nq]):
+            if not any(distance(system, q, np.array(mode.q)) < _SAME_FOUND for mode in found):
                 _require_locked(closing, q)
                 more.append(_checked(system, q, (), p))
         proofs.append(f"a search from random starts found {len(more)} more")
         found += _distinct(more)
     return ModeList(found, complete=complete, proof="; ".join(proofs))
-
-
-def _near(system: System, q: Vector, mode: Mode) -> bool:
-    """Whether a configuration q (nq,) is a mode, up to full rotations and 1e-6."""
-    gap = difference(system, q, np.array(mode.q))
-    return bool(np.max(np.abs(gap), initial=0.0) < _SAME_START)
 
 
 def _every(steps: Sequence[Step], q: Vector, p: Vector, told: list[Roots]) -> Iterator[Vector]:
@@ -236,7 +236,7 @@ def _refined(closing: Closing, q: Vector) -> Vector:
     if closing.openness(q) <= TOLERANCE:
         return q
     near = closing.nearest(q)
-    moved = np.max(np.abs(difference(closing.system, near.q, q)), initial=0.0)
+    moved = distance(closing.system, near.q, q)
     return near.q if near.is_closed and moved < _REFINED else q
 
 
@@ -281,13 +281,83 @@ def _require_locked(closing: Closing, q: Vector) -> None:
     )
 
 
-# Configurations that move a frame to a given pose, found from random starts.
+# Configurations found from random starts, the same at each call.
+
+
+_SAME_FOUND = 1e-6
+"""Difference of positions [rad or m] below which two results of a search are the same: closed to
+1e-12, they agree to 1e-12 at regular configurations and to its square root at singular ones."""
+
+
+def distance(system: System, q: Vector, other: Vector) -> float:
+    """Return the largest difference of a position of two configurations (nq,) [rad or m]."""
+    return float(np.max(np.abs(difference(system, q, other)), initial=0.0))
+
+
+def _search(
+    system: System,
+    starts: Iterable[Vector],
+    solution: Callable[[Vector], Vector | None],
+    least: int,
+    hits: list[int],
+) -> Iterator[Vector]:
+    """Yield each distinct solution that an iteration finds from some start, as soon as found.
+
+    The search ends early if the last three quarters of the starts found no new solution and every
+    solution was found twice. Completeness is not proved.
+
+    Args:
+        system: mechanism of the configurations.
+        starts: configurations (nq,) from which the iteration starts.
+        solution: function from a start to a solution (nq,), or None if the iteration fails.
+        least: smallest number of starts.
+        hits: empty list, filled with the number of starts that led to each solution.
+    """
+    found, newest = list[Vector](), 0
+    for number, start in enumerate(starts, start=1):
+        q = solution(start)
+        if q is not None:
+            known = (k for k, own in enumerate(found) if distance(system, own, q) < _SAME_FOUND)
+            met = next(known, None)
+            if met is not None:
+                hits[met] += 1
+            else:
+                found.append(q)
+                hits.append(1)
+                newest = number
+                yield q
+        if number >= max(least, 4 * newest) and all(count > 1 for count in hits):
+            break
+
+
+def _random_starts(
+    system: System, middle: Vector, moving: list[int], reach: float, count: int, seed: int
+) -> Iterator[Vector]:
+    """Yield configurations with random changes of the moving positions.
+
+    Args:
+        system: mechanism of the configurations.
+        middle: (nq,) configuration that is changed.
+        moving: indices of the positions that change.
+        reach: largest change [rad or m]; quaternions are normalised afterwards.
+        count: number of configurations.
+        seed: seed of the random numbers.
+    """
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        q = middle.copy()
+        q[moving] += rng.uniform(-reach, reach, len(moving))
+        for part in quaternion_slices(system.tree):
+            q[part] /= np.linalg.norm(q[part])
+        yield q
+
+
+# Configurations that move a frame to a given pose.
 
 
 _TRIES, _LEAST, _SEED = 500, 60, 20260103
-_SAME_WORKING_MODE = 1e-6
-"""Difference of positions [rad or m] below which two results of the search are the same: closed to
-1e-12, they agree to 1e-12 at regular configurations and to its square root at singular ones."""
+"""Largest and smallest number of starts, and seed of the random numbers. A mode that every twelfth
+start reaches is missed by 60 starts with a probability of half a percent."""
 _LOOSE = 1e-5
 """Relative singular value below which joints can move: closed to 1e-12, a mode that can move has an
 error of the square root, 1e-6, and its singular value has the same size."""
@@ -353,43 +423,24 @@ def working_modes(
             " zero and at least one try"
         )
     middle = np.array(system.position(guess))
-    found: list[WorkingMode] = []
-    newest = 0
-    for number, start in enumerate(_starts(system, middle, reach, tries), start=1):
-        configuration, known = target.nearest(start), len(found)
-        if configuration.is_closed:
-            _add(target, found, _tidy(target, configuration.q))
-        newest = number if len(found) > known else newest
-        if number >= max(_LEAST, 4 * newest) and all(mode.hits > 1 for mode in found):
-            break
-    return sorted(found, key=lambda mode: _distance(system, np.array(mode.q), middle))
+    first = middle.copy()
+    for part in quaternion_slices(system.tree):
+        first[part] /= np.linalg.norm(first[part])
 
+    def solution(start: Vector) -> Vector | None:
+        near = target.nearest(start)
+        return _tidy(target, near.q) if near.is_closed else None
 
-def _starts(system: System, middle: Vector, reach: float, tries: int) -> list[Vector]:
-    """Return start configurations: `middle` (nq,), then random ones within `reach` of it."""
-    rng = np.random.default_rng(_SEED)
-    drawn = [middle, *(middle + rng.uniform(-reach, reach, middle.shape) for _ in range(tries - 1))]
-    for q in drawn:
-        for part in quaternion_slices(system.tree):
-            q[part] /= np.linalg.norm(q[part])
-    return drawn
-
-
-def _add(target: Goal, found: list[WorkingMode], q: Vector) -> None:
-    """Append the configuration q as a working mode, or count one more hit if it is in the list."""
-    system = target.closing.system
-    for number, mode in enumerate(found):
-        if _distance(system, np.array(mode.q), q) < _SAME_WORKING_MODE:
-            found[number] = replace(mode, hits=mode.hits + 1)
-            return
-    _require_isolated(target, q)
-    residual = float(np.max(np.abs(target.residual(q)[0])))
-    found.append(WorkingMode(tuple(float(x) for x in q), residual, 1))
-
-
-def _distance(system: System, q: Vector, other: Vector) -> float:
-    """Return the largest difference of a position of two configurations (nq,) [rad or m]."""
-    return float(np.max(np.abs(difference(system, q, other)), initial=0.0))
+    hits, found = list[int](), list[Vector]()
+    others = _random_starts(system, middle, list(range(system.nq)), reach, tries - 1, _SEED)
+    for q in _search(system, chain([first], others), solution, _LEAST, hits):
+        _require_isolated(target, q)
+        found.append(q)
+    modes = [
+        WorkingMode(tuple(float(x) for x in q), _largest_row(target.residual(q)[0]), count)
+        for q, count in zip(found, hits, strict=True)
+    ]
+    return sorted(modes, key=lambda mode: distance(system, np.array(mode.q), first))
 
 
 def _tidy(target: Goal, q: Vector) -> Vector:
@@ -423,64 +474,39 @@ def _require_isolated(target: Goal, q: Vector) -> None:
     )
 
 
-# Configurations that close the loops with some positions locked, found from random starts.
+# Configurations that close the loops with some positions locked.
 
 
 _START_TRIES, _LEAST_STARTS, _START_SEED = 300, 40, 20260107
+"""Largest and smallest number of starts, fewer than for `working_modes` because locked positions
+leave fewer configurations; and seed of the random numbers."""
 _REACH = np.pi
 """Largest difference of a random start from the given positions [rad or m]: half a rotation covers
 all angles."""
-_SAME_START = 1e-6
-"""Difference of positions [rad or m] below which two results are the same, as for
-`_SAME_WORKING_MODE`."""
 
 
-def closed_configurations(closing: Closing, start: Vector) -> list[Vector]:
-    """Return configurations found by Gauss-Newton from random starts, the same at each call.
+def closed_configurations(closing: Closing, start: Vector) -> Iterator[Vector]:
+    """Yield configurations found by Gauss-Newton from random starts, the same at each call.
 
-    The search ends early after at least 40 starts, if the last three quarters found no new
-    configuration and every configuration was found twice. Completeness is not proved.
+    At least 40 of 300 starts are used, until the search ends early, see `_search`.
 
     Args:
         closing: closure rows and the indices of the locked positions.
         start: (nq,) configuration. Its locked positions are kept, and random starts are around its
             other positions.
 
-    Returns:
+    Yields:
         Configurations (nq,) with angles within half a rotation of zero.
     """
-    return list(_closed_configurations(closing, start))
 
+    def solution(q: Vector) -> Vector | None:
+        near = closing.nearest(q)
+        return _tidy_start(closing, near.q) if near.is_closed else None
 
-def _closed_configurations(closing: Closing, start: Vector) -> Iterator[Vector]:
-    """Yield the results of `closed_configurations`, each as soon as it is found."""
-    rng = np.random.default_rng(_START_SEED)
-    found, hits, newest = list[Vector](), list[int](), 0
-    for number in range(1, _START_TRIES + 1):
-        closed = closing.nearest(_moved(closing, start, rng) if number > 1 else start)
-        if closed.is_closed:
-            q = _tidy_start(closing, closed.q)
-            met = [
-                k
-                for k, other in enumerate(found)
-                if _start_distance(closing, q, other) < _SAME_START
-            ]
-            for k in met[:1]:
-                hits[k] += 1
-            if not met:
-                found, hits, newest = [*found, q], [*hits, 1], number
-                yield q
-        if number >= max(_LEAST_STARTS, 4 * newest) and all(count > 1 for count in hits):
-            break
-
-
-def _moved(closing: Closing, start: Vector, rng: np.random.Generator) -> Vector:
-    """Return `start` (nq,) with random changes of its free positions and unit quaternions."""
-    q = start.copy()
-    q[closing.free] += rng.uniform(-_REACH, _REACH, len(closing.free))
-    for part in quaternion_slices(closing.system.tree):
-        q[part] /= np.linalg.norm(q[part])
-    return q
+    system = closing.system
+    count = _START_TRIES - 1
+    others = _random_starts(system, start, closing.free, _REACH, count, _START_SEED)
+    return _search(system, chain([start], others), solution, _LEAST_STARTS, [])
 
 
 def _tidy_start(closing: Closing, q: Vector) -> Vector:
@@ -491,8 +517,3 @@ def _tidy_start(closing: Closing, q: Vector) -> Vector:
     tidy = within_half_turn(closing.system, q)
     tidy[list(closing.locked)] = q[list(closing.locked)]
     return tidy if closing.openness(tidy) < OPEN else q
-
-
-def _start_distance(closing: Closing, q: Vector, other: Vector) -> float:
-    """Return the largest difference of a position of two configurations (nq,) [rad or m]."""
-    return float(np.max(np.abs(difference(closing.system, q, other)), initial=0.0))

@@ -224,7 +224,7 @@ def _is_nearer(
 
     Guessed positions are compared first, then all positions, then massless nodes, which move less.
     If both are equally near, the first position that differs decides, in the order of the
-    description: the larger value is nearer.
+    description: the larger value is nearer. Quaternions are compared with a positive first element.
     """
     distances, others = (target.distances(closing, one, own) for one in (q, other))
     for distance, least in zip(distances, others, strict=True):
@@ -234,8 +234,14 @@ def _is_nearer(
     order = {row.name: number for number, row in enumerate(system.joints)}
     rows, moves = target.rows, target.moves_between(q, other)
     apart = [k for k in range(len(rows)) if abs(moves[k]) > EQUAL]
-    first = min(apart, key=lambda k: order.get(rows[k].joint, k), default=None)
-    return first is not None and bool(moves[first] > 0)
+    if not apart:
+        return False
+    first = min(apart, key=lambda k: order.get(rows[k].joint, k))
+    if rows[first].kind == "quaternion":  # a quaternion and its negative are one orientation
+        own_joint = [k for k in apart if rows[k].joint == rows[first].joint]
+        moves = target.signed_positions(q) - target.signed_positions(other)
+        first = next((k for k in own_joint if abs(moves[k]) > EQUAL), first)
+    return bool(moves[first] > 0)
 
 
 # Mechanisms with many free positions, block by block.

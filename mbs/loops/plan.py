@@ -30,7 +30,7 @@ from mbs.closed_forms.ring import (
     ring_of,
     spin_indices,
 )
-from mbs.closed_forms.roots import LoopBranches
+from mbs.closed_forms.roots import LoopBranches, Roots
 from mbs.closed_forms.spatial import (
     RigidLink,
     coupled_position,
@@ -79,21 +79,6 @@ class Stage:
     values: Function
     spin: tuple[int, Function] | None = None
     chosen: int = 0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Roots:
-    """All solutions of the loops of a block for given known positions.
-
-    Attributes:
-        values: (r, k) positions of the block, one row per solution.
-        proof: text on the solution method, for use within a sentence.
-        complete: whether the method proves that no solution is missing.
-    """
-
-    values: Vector
-    proof: str
-    complete: bool = True
 
 
 @dataclass(frozen=True, slots=True, eq=False)

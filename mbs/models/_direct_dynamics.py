@@ -34,7 +34,7 @@ from mbs.operations.counts import cheapest
 from mbs.recursions.articulated_body import articulated_accelerations, inertia_pivots
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
 from mbs.recursions.composite_body import solve_tree, velocity_antecedents
-from mbs.recursions.poses import link_poses
+from mbs.recursions.link_motions import link_poses
 from mbs.solvers.rank import dense, first_best, rank
 from mbs.text import did_you_mean, quoted
 

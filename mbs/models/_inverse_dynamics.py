@@ -18,10 +18,15 @@ from mbs.models.symbols import (
 )
 from mbs.models.tree_table import TreeLoops
 from mbs.recursions.force_elements import element_efforts
-from mbs.recursions.names import newton_euler_names
-from mbs.recursions.newton_euler import Dynamics, joint_efforts, newton_euler, spring_effort
+from mbs.recursions.link_motions import resting_base
+from mbs.recursions.newton_euler import (
+    Dynamics,
+    joint_efforts,
+    newton_euler,
+    newton_euler_names,
+    spring_effort,
+)
 from mbs.recursions.parts import PartsAt
-from mbs.recursions.velocities import resting_base
 
 
 def inverse_dynamics(

@@ -37,10 +37,10 @@ from mbs.recursions.force_elements import (
     sum_wrenches,
     transmitted_wrenches,
 )
+from mbs.recursions.link_motions import Acceleration, link_accelerations
 from mbs.recursions.newton_euler import inertial_wrench
 from mbs.recursions.parts import PartsAt
 from mbs.recursions.route import relative_pose
-from mbs.recursions.velocities import Acceleration, link_accelerations
 from mbs.solvers.linear import solve_saddle, solve_square
 from mbs.spatial import Pose, PseudoInertia, Wrench, add_wrenches, cross, transform_wrench, zeros
 

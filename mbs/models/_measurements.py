@@ -25,6 +25,13 @@ from mbs.models.symbols import (
     surroundings,
     symbols_of,
 )
+from mbs.recursions.link_motions import (
+    Acceleration,
+    Velocity,
+    link_accelerations,
+    link_velocities,
+    resting_base,
+)
 from mbs.recursions.parts import later_signal, later_sources
 from mbs.recursions.readings import (
     Readings,
@@ -34,13 +41,6 @@ from mbs.recursions.readings import (
     in_axes,
 )
 from mbs.recursions.route import frame_velocity, relative_acceleration, relative_motion
-from mbs.recursions.velocities import (
-    Acceleration,
-    Velocity,
-    link_accelerations,
-    link_velocities,
-    resting_base,
-)
 from mbs.spatial import Wrench, zeros
 
 

@@ -40,8 +40,8 @@ from mbs.models._dae import (
 from mbs.models._inverse_dynamics import tree_efforts
 from mbs.models.symbols import ModelSymbols, outputs_of, surroundings, symbols_of
 from mbs.recursions.composite_body import inertia_matrix
+from mbs.recursions.link_motions import link_accelerations, link_velocities, resting_base
 from mbs.recursions.route import relative_acceleration, relative_motion
-from mbs.recursions.velocities import link_accelerations, link_velocities, resting_base
 from mbs.solvers.least_squares import gauss_newton
 from mbs.solvers.rank import independent_rows, rank
 from mbs.spatial import zeros

@@ -43,10 +43,10 @@ from mbs.recursions.composite_body import (
 )
 from mbs.recursions.composite_body import inertia_matrix as tree_inertia
 from mbs.recursions.force_elements import element_efforts
+from mbs.recursions.link_motions import resting_base
 from mbs.recursions.newton_euler import joint_efforts
 from mbs.recursions.newton_euler_derivatives import newton_euler_derivatives
 from mbs.recursions.parts import PartsAt
-from mbs.recursions.velocities import resting_base
 from mbs.text import quoted
 
 # Derivatives of efforts and accelerations by each method.

@@ -18,10 +18,10 @@ from mbs.models.symbols import (
     symbols_of,
 )
 from mbs.recursions.jacobian import VelocityTarget, cheapest_jacobian, renaud
+from mbs.recursions.link_motions import Acceleration, Velocity, moving_base, resting_base
+from mbs.recursions.link_motions import link_accelerations as tree_accelerations
+from mbs.recursions.link_motions import link_velocities as tree_velocities
 from mbs.recursions.route import express
-from mbs.recursions.velocities import Acceleration, Velocity, moving_base, resting_base
-from mbs.recursions.velocities import link_accelerations as tree_accelerations
-from mbs.recursions.velocities import link_velocities as tree_velocities
 from mbs.spatial import Pose, zeros
 from mbs.text import quoted
 

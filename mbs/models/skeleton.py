@@ -19,7 +19,7 @@ from mbs.assembly.tree import Frame, normalised
 from mbs.components.description import OUTER_WORLD
 from mbs.components.joints import Motion
 from mbs.models.geometry import terminal_frame
-from mbs.recursions.poses import base_poses, link_poses
+from mbs.recursions.link_motions import base_poses, link_poses
 from mbs.spatial import Pose
 
 # Lines that represent a rigid link, between its joints and other points.

@@ -16,9 +16,14 @@ from mbs.loops.examination import DETERMINED
 from mbs.loops.reduction import Reduction, reduction
 from mbs.recursions.composite_body import velocity_antecedents
 from mbs.recursions.force_elements import element_wrenches, sum_wrenches
+from mbs.recursions.link_motions import (
+    Acceleration,
+    LinkPose,
+    link_poses,
+    moving_base,
+    resting_base,
+)
 from mbs.recursions.parts import PartsAt, later_signal, later_sources
-from mbs.recursions.poses import LinkPose, link_poses
-from mbs.recursions.velocities import Acceleration, moving_base, resting_base
 from mbs.spatial import Wrench, transform_wrench
 
 COORDINATES = ("independent", "tree")

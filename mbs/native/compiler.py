@@ -235,15 +235,20 @@ def _compile(compiler: Compiler, arguments: Sequence[str], sources: Sequence[Pat
     """
     program, names = compiler.command[0], ", ".join(source.name for source in sources)
     try:
-        answer = subprocess.run(
+        with subprocess.Popen(
             [*compiler.command, *arguments],
-            capture_output=True,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
             text=True,
             errors="replace",
-            check=False,
-            stdin=subprocess.DEVNULL,
-            timeout=_LONGEST,
-        )
+        ) as process:
+            try:
+                _, stderr = process.communicate(timeout=_LONGEST)
+            except BaseException:
+                process.kill()
+                process.wait()  # control-C ends `subprocess.run` while the process still runs
+                raise
     except subprocess.TimeoutExpired as error:
         raise CompilerError(
             f"{program} did not end within {_LONGEST:.0f} s at {names}; take shorter models, or"
@@ -254,15 +259,15 @@ def _compile(compiler: Compiler, arguments: Sequence[str], sources: Sequence[Pat
             f"{program} does not start ({error.strerror or error}); name another compiler by the"
             " environment variable CC"
         ) from error
-    if answer.returncode < 0:
+    if process.returncode < 0:
         raise CompilerError(
-            f"{program} was ended by signal {-answer.returncode} at {names}; where memory was"
+            f"{program} was ended by signal {-process.returncode} at {names}; where memory was"
             " short, take shorter models"
         )
-    if answer.returncode != 0:
-        if os.strerror(errno.ENOSPC) in answer.stderr:
+    if process.returncode != 0:
+        if os.strerror(errno.ENOSPC) in stderr:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        complaint = _complaint(answer.stderr)
+        complaint = _complaint(stderr)
         raise CompilerError(f"{program} refused {names}: {complaint.strip()[:500]}")
 
 

@@ -16,10 +16,9 @@ from casadi import SX
 
 from mbs.assembly.tree import Link, Tree
 from mbs.components.joints import Motion
+from mbs.recursions.link_motions import Acceleration, LinkPose, link_accelerations
 from mbs.recursions.newton_euler import inertial_wrench, rotor_efforts, rotor_moments
-from mbs.recursions.poses import LinkPose
 from mbs.recursions.regrouping import regroup, shift_frames
-from mbs.recursions.velocities import Acceleration, link_accelerations
 from mbs.spatial import (
     Displacement,
     Inertia,

@@ -11,10 +11,9 @@ import casadi
 from casadi import SX
 
 from mbs.assembly.tree import Tree
+from mbs.recursions.link_motions import LinkPose, effort, unit_motions
 from mbs.recursions.newton_euler import momentum_on
-from mbs.recursions.poses import LinkPose
 from mbs.recursions.regrouping import regroup, shift_frames
-from mbs.recursions.velocities import effort, unit_motions
 from mbs.spatial import Wrench, transform_inertia_along, transform_wrench_along, zeros
 
 

@@ -7,9 +7,8 @@ import casadi
 from casadi import SX
 
 from mbs.assembly.tree import Tree
+from mbs.recursions.link_motions import LinkPose, base_poses, link_velocities
 from mbs.recursions.newton_euler import rotor_energy
-from mbs.recursions.poses import LinkPose, base_poses
-from mbs.recursions.velocities import link_velocities
 from mbs.spatial import cross
 
 

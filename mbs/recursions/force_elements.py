@@ -11,14 +11,14 @@ import casadi
 from casadi import SX
 
 from mbs.assembly.tree import Tree
-from mbs.recursions.newton_euler import inertial_wrench, rotor_moments
-from mbs.recursions.parts import PartsAt
-from mbs.recursions.poses import LinkPose
-from mbs.recursions.velocities import (
+from mbs.recursions.link_motions import (
     Acceleration,
+    LinkPose,
     effort,
     link_accelerations,
 )
+from mbs.recursions.newton_euler import inertial_wrench, rotor_moments
+from mbs.recursions.parts import PartsAt
 from mbs.spatial import PseudoInertia, Wrench, add_wrenches, transform_wrench, zeros
 
 # Wrenches that the joints of a tree transmit between the links of the description.

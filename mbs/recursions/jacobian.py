@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from mbs.assembly.tree import Frame, Tree
 from mbs.components.joints import Motion
-from mbs.recursions.poses import base_poses, link_poses
+from mbs.recursions.link_motions import base_poses, link_poses, unit_motions_at_joint
 from mbs.recursions.route import (
     JointAt,
     OriginOf,
@@ -38,7 +38,6 @@ from mbs.recursions.route import (
     relative_pose,
     reverse_path,
 )
-from mbs.recursions.velocities import unit_motions_at_joint
 from mbs.spatial import Pose, Rotation, cross, is_zero, skew, zeros
 
 

@@ -14,8 +14,7 @@ from casadi import SX
 
 from mbs.assembly.tree import Link, Tree
 from mbs.components.joints import Motion
-from mbs.recursions.poses import LinkPose
-from mbs.recursions.velocities import Acceleration, motion_behind, unit_motions
+from mbs.recursions.link_motions import Acceleration, LinkPose, motion_behind, unit_motions
 from mbs.spatial import Displacement, Rotation, ScrewDisplacement, cross, is_zero, vector, zeros
 
 # Unit motions of a joint and their rates, relative to an observer at the joint.

@@ -19,10 +19,8 @@ from casadi import DM, SX
 
 from mbs.assembly.tree import Link, Tree, position_rate
 from mbs.components.joints import Motion
-from mbs.recursions.newton_euler import momentum_on, spin_momenta
-from mbs.recursions.poses import LinkPose
-from mbs.recursions.regrouping import regroup, shift_frames
-from mbs.recursions.velocities import (
+from mbs.recursions.link_motions import (
+    LinkPose,
     effort_at_joint,
     link_accelerations,
     motion_at_joint,
@@ -30,6 +28,8 @@ from mbs.recursions.velocities import (
     resting_base,
     unit_motions_at_joint,
 )
+from mbs.recursions.newton_euler import momentum_on, spin_momenta
+from mbs.recursions.regrouping import regroup, shift_frames
 from mbs.spatial import (
     Displacement,
     FreeDisplacement,

@@ -14,10 +14,9 @@ from casadi import SX
 
 from mbs.assembly.tree import CarriedRotor, Tree
 from mbs.recursions.joint_axes import AxesStep, JointAxes, Line, MovingFrame, Twist, joint_axes
+from mbs.recursions.link_motions import Acceleration, LinkPose, link_accelerations
 from mbs.recursions.newton_euler import inertial_wrench, rotor_efforts, rotor_moments, spin_momenta
-from mbs.recursions.poses import LinkPose
 from mbs.recursions.regrouping import regroup, shift_frames
-from mbs.recursions.velocities import Acceleration, link_accelerations
 from mbs.spatial import (
     FreeDisplacement,
     Inertia,

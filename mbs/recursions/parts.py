@@ -32,10 +32,9 @@ from mbs.components.custom import (
 )
 from mbs.errors import AssemblyError
 from mbs.expressions import to_sx
-from mbs.recursions.poses import link_poses
+from mbs.recursions.link_motions import Velocity, link_poses, link_velocities
 from mbs.recursions.readings import Readings, coordinate_readings, frame_readings
 from mbs.recursions.route import BASE, relative_motion
-from mbs.recursions.velocities import Velocity, link_velocities
 from mbs.spatial import Pose, cross, skew
 
 UNBOUNDED = 1e100

@@ -10,8 +10,8 @@ from casadi import SX
 from mbs.assembly.tables import AttachedSensor, Coordinate
 from mbs.assembly.tree import Frame, Tree
 from mbs.components.custom import regular_length
+from mbs.recursions.link_motions import Acceleration, Velocity
 from mbs.recursions.route import BASE, relative_acceleration, relative_motion, relative_pose
-from mbs.recursions.velocities import Acceleration, Velocity
 
 Readings = dict[str, SX]
 """Readings of a sensor by the name of the quantity."""

@@ -18,8 +18,7 @@ from casadi import SX
 
 from mbs.assembly.tree import Tree
 from mbs.components.joints import Motion
-from mbs.recursions.poses import LinkPose
-from mbs.recursions.velocities import Acceleration, Velocity, unit_motions
+from mbs.recursions.link_motions import Acceleration, LinkPose, Velocity, unit_motions
 from mbs.spatial import (
     Inertia,
     ScrewDisplacement,

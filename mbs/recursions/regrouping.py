@@ -16,7 +16,7 @@ from casadi import SX
 
 from mbs.assembly.tree import Tree
 from mbs.components.joints import Motion
-from mbs.recursions.poses import LinkPose
+from mbs.recursions.link_motions import LinkPose
 from mbs.spatial import (
     Body,
     Inertia,

@@ -19,7 +19,7 @@ from mbs.assembly.tree import Frame, Link, Tree
 from mbs.components.custom import RelativeMotion
 from mbs.components.joints import Motion
 from mbs.operations import count
-from mbs.recursions.velocities import Acceleration, Velocity
+from mbs.recursions.link_motions import Acceleration, Velocity
 from mbs.spatial import (
     AxisRotation,
     Khalil,

@@ -12,12 +12,12 @@ from types import MappingProxyType
 from typing import Any
 
 from mbs.arguments import values_given
+from mbs.components.bodies import Mounting
+from mbs.components.component import component_name
 from mbs.components.locking import Base, fix_root, free_root
-from mbs.components.mounting import Mounting
 from mbs.errors import DescriptionError
 from mbs.expressions import Scalar
 from mbs.formats import from_dict, read_mjcf, read_par, read_sdf, read_toml, read_urdf, to_mechanism
-from mbs.formats.files import component_name
 from mbs.mechanism import Mechanism
 from mbs.text import did_you_mean, quoted
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import logging
 import math
@@ -10,10 +11,9 @@ import tempfile
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import lru_cache
-from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Literal
@@ -27,31 +27,34 @@ from mbs.progress import progress
 from mbs.result import Result, State, state_of
 from mbs.simulate.arguments import positive
 from mbs.simulate.fmu_plan import (
-    Inputs,
     Interface,
     Plan,
     Recording,
-    Tracks,
-    check_names,
     recording_of,
     require_equal_steps,
     row_times,
     set_up,
-    start_values,
-    tracks_of,
     with_points,
 )
-from mbs.simulate.fmu_variables import NUMBERS
+from mbs.simulate.fmu_variables import Inputs, check_names, recordable, start_values, tracks_of
+from mbs.solvers.control_c import control_c
 from mbs.text import quoted
 
-# Co-simulation of an FMU, which integrates by itself.
+# Steps and events of an FMU.
 #
-# An input that the FMU cannot follow during a step is held at its value in the middle of the
-# step, which is accurate to second order. It is set to its current value before a row is recorded.
+# FMPy loads the FMU, calls its functions, reads its variables and integrates Model Exchange. The
+# loop of `fmpy.simulate_fmu` is not used: its inputs are sampled, its solver evaluates derivatives
+# with the inputs of an earlier time, an error within the solver is lost, and Co-Simulation has
+# neither time events nor steps that end at the kinks of inputs.
+#
+# In co-simulation, an input that the FMU cannot follow during a step is held at its value in the
+# middle of the step, which is accurate to second order. It is set to its current value before a
+# row is recorded.
 
 
 _DISCARD = 2
 _MOST_ITERATIONS = 1000
+_MOST_STEPS = 100_000  # maximum number of integrator steps per output interval
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,11 +65,13 @@ class Reached:
         time: time at the end of the step [s].
         event: Whether an event occurred at this time.
         terminated: Whether the FMU requests the end of the simulation.
+        fired: names of the event indicators that changed sign.
     """
 
     time: float
     event: bool = False
     terminated: bool = False
+    fired: tuple[str, ...] = ()
 
 
 @dataclass(slots=True)
@@ -82,7 +87,7 @@ class Intermediate:
 
     apply: Callable[[float, bool], None] | None = None
     look: Callable[[float], None] | None = None
-    lost: list[Exception] = field(default_factory=list)
+    lost: list[BaseException] = field(default_factory=list)
 
     def __call__(
         self, _: Any, time: float, settable: bool, gettable: bool, finished: bool, *rest: Any
@@ -93,11 +98,17 @@ class Intermediate:
                 self.apply(time, False)
             if gettable and finished and self.look is not None:
                 self.look(time)
-        except Exception as error:
+        except BaseException as error:  # control-C too
             self.lost.append(error)
 
 
-def co_simulate(instance: Any, plan: Plan, recording: Recording, watch: Intermediate) -> None:
+def simulate(
+    instance: Any,
+    plan: Plan,
+    recording: Recording,
+    watch: Intermediate,
+    check: Callable[[], object] = lambda: None,
+) -> None:
     """Run an instance from begin to end; rows and events go to the recording.
 
     Args:
@@ -105,396 +116,338 @@ def co_simulate(instance: Any, plan: Plan, recording: Recording, watch: Intermed
         plan: settings of the simulation.
         recording: recording to which rows and events are added.
         watch: intermediate update callback of the instance.
+        check: callable that raises KeyboardInterrupt after control-C.
 
     Raises:
         ModelError: the FMU requires a fixed step size, and it does not divide the duration.
-        SolverError: a value is not finite, or an event does not end.
+        SolverError: a step fails, a value is not finite, or an event does not end.
     """
-    offered = plan.description.coSimulation
-    where = f"FMU {plan.description.modelName}"
-    flexible = offered.canHandleVariableCommunicationStepSize
-    if not flexible:
-        require_equal_steps(plan, where)
-    points = with_points(plan.times, plan.tracks.corners if flexible else ())
+    stepped = plan.kind == "CoSimulation"
+    corners: Iterable[float] = plan.tracks.corners if stepped else plan.tracks.jumps
+    if stepped and not plan.description.coSimulation.canHandleVariableCommunicationStepSize:
+        require_equal_steps(plan, f"FMU {plan.description.modelName}")
+        corners = ()
+    points = with_points(plan.times, corners)
     set_up(instance, plan)
-    if plan.newer:
-        _newer(instance, plan, points, (recording, watch))
+    if not stepped:
+        run: _Run = _Exchange(instance, plan, recording, check)
+    elif plan.newer:
+        run = _Newer(instance, plan, recording, watch)
     else:
-        _older(instance, plan, points, recording)
+        run = _Older(instance, plan, recording)
+    following, ended = run.start()
+    recording.begin(plan.begin)
+    if not ended:
+        _advance(run, points, following, check)
     instance.terminate()
 
 
-def _older(instance: Any, plan: Plan, points: dict[float, bool], recording: Recording) -> None:
-    """Run FMI 2.0: set inputs, with slopes if the FMU interpolates, then step."""
-    apply = plan.tracks.setter(instance)
-    held = not plan.description.coSimulation.canInterpolateInputs
-    recording.begin(plan.begin)
-    for begin, end in pairwise(points):
-        apply((begin + end) / 2 if held else begin, True)
-        if plan.tracks.variables and not held:
-            references, slopes = plan.tracks.slopes(begin, end)
-            instance.setRealInputDerivatives(references, [1] * len(references), slopes)
-        reached = _step_older(instance, begin, end)
-        if held:
-            apply(reached.time, False)
-        if points[end] or reached.terminated:
-            recording.row(reached.time)
-        recording.record_event(reached.time)
-        if reached.terminated:
-            return recording.ended(reached.time)
-    return None
-
-
-def _step_older(instance: Any, begin: float, end: float) -> Reached:
-    from fmpy.fmi1 import FMICallException
-    from fmpy.fmi2 import fmi2LastSuccessfulTime, fmi2Terminated
-
-    try:
-        instance.doStep(currentCommunicationPoint=begin, communicationStepSize=end - begin)
-    except FMICallException as error:
-        if error.status != _DISCARD or not instance.getBooleanStatus(fmi2Terminated):
-            raise
-        return Reached(float(instance.getRealStatus(fmi2LastSuccessfulTime)), terminated=True)
-    return Reached(end)
-
-
-def _newer(
-    instance: Any, plan: Plan, points: dict[float, bool], kept: tuple[Recording, Intermediate]
+def _advance(
+    run: _Run, points: dict[float, bool], following: float, check: Callable[[], object]
 ) -> None:
-    """Run FMI 3.0: step to the next point or event, and process events in event mode."""
-    offered, (recording, watch) = plan.description.coSimulation, kept
-    continuous = plan.tracks.continuous() if offered.hasEventMode else plan.tracks
-    run = _Newer(instance, plan, recording, watch, continuous.setter(instance))
-    watch.apply = plan.tracks.continuous().setter(instance)
-    watch.look = recording.row if plan.rows == "solver" else None
-    following = run.update() if offered.hasEventMode else math.inf
-    recording.begin(plan.begin)
-    time = plan.begin
+    """Step to the points, the values of which are True for a row, and process events.
+
+    Args:
+        run: initialized FMU.
+        points: result of `with_points`.
+        following: time of the first time event [s], or inf.
+        check: callable that raises KeyboardInterrupt after control-C.
+    """
+    recording, time = run.recording, run.plan.begin
     for end, row in list(points.items())[1:]:
-        run.apply((time + end) / 2, True)
+        run.approach(time, end)
         tries = 0
         while time < end:
             reached = run.step(time, min(end, following))
+            check()
             tries = tries + 1 if reached.time == time else 0
             if tries > _MOST_ITERATIONS:
                 raise SolverError(f"FMU {recording.name} does not get beyond time {time:.9g} s")
             time = reached.time
             if time == end:
-                run.apply(end, False)
-            happens = offered.hasEventMode and (
-                reached.event or time >= following or time in plan.tracks.jumps
-            )
+                run.arrive(end)
+            happens = reached.event or time >= following or time in run.jumps
             if happens or reached.terminated or (row and time == end):
                 recording.row(time)
-            if reached.terminated:
-                return recording.ended(time)
-            if happens:
-                unsaid = reached.event or time >= following
-                following = run.event(time, jumped=time == end, otherwise=["event"] * unsaid)
+            ended = reached.terminated
+            if happens and not ended:
+                unsaid = run.unsaid(reached, following)
+                following, ended = run.event(time, time == end)
+                recording.row(time)
+                recording.record_event(time, unsaid)
             else:
                 recording.record_event(time)
-    return None
+            if ended:
+                recording.events.append((time, recording.name, "ends the simulation"))
+                return
 
 
-@dataclass(frozen=True, slots=True)
-class _Newer:
-    """Calls of FMI 3.0 for co-simulation."""
+class _Run:
+    """Calls of an interface of FMI for steps and events.
 
-    instance: Any
-    plan: Plan
-    recording: Recording
-    watch: Intermediate
-    apply: Callable[[float, bool], None]
+    Attributes:
+        events: Whether the interface has events.
+        jumps: times at which jumps of inputs are processed as events [s].
+    """
+
+    def __init__(self, instance: Any, plan: Plan, recording: Recording, *, events: bool) -> None:
+        self.instance, self.plan, self.recording = instance, plan, recording
+        self.events = events
+        self.jumps = plan.tracks.jumps if events else frozenset[float]()
+        self.apply = plan.tracks.setter(instance)
+        self.apply_continuous = plan.tracks.continuous().setter(instance)
+
+    def start(self) -> tuple[float, bool]:
+        """Return the time of the first time event [s], or inf, and whether to end."""
+        return self.update() if self.events else (math.inf, False)
+
+    def approach(self, begin: float, end: float) -> None:
+        """Set the inputs of an interval."""
 
     def step(self, begin: float, end: float) -> Reached:
         """Make a step, and return its end."""
-        event, terminated, early, last = self.instance.doStep(
-            currentCommunicationPoint=begin, communicationStepSize=end - begin
-        )
-        if self.watch.lost:
-            raise self.watch.lost[0]
-        time = float(last) if early and last < end else end
-        return Reached(time, bool(event), bool(terminated))
+        raise NotImplementedError
 
-    def event(self, time: float, *, jumped: bool, otherwise: list[str]) -> float:
-        """Process an event, and return the time of the next time event [s], or inf."""
+    def arrive(self, end: float) -> None:
+        """Set the inputs at the end of an interval."""
+
+    def event(self, time: float, jumped: bool) -> tuple[float, bool]:
+        """Process an event; return the time of the next time event [s], and whether to end.
+
+        Args:
+            time: time [s].
+            jumped: Whether inputs may jump at this time.
+        """
         self.instance.enterEventMode()
         if jumped:
-            self.plan.tracks.setter(self.instance)(time, True)
-        following = self.update()
-        self.recording.row(time)
-        self.recording.record_event(time, [(self.recording.name, words) for words in otherwise])
-        return following
-
-    def update(self) -> float:
-        """Iterate an event to convergence, and return to step mode."""
-        for _ in range(_MOST_ITERATIONS):
-            again, terminated, _, _, known, next_time = self.instance.updateDiscreteStates()
-            if terminated:
-                raise SolverError(f"FMU {self.recording.name} asks for the end at an event")
-            if not again:
-                self.instance.enterStepMode()
-                return float(next_time) if known else math.inf
-        raise SolverError(f"FMU {self.recording.name}: an event does not come to an end")
-
-
-# Model exchange of an FMU: an integrator of FMPy makes the steps and locates the events.
-
-
-_MOST_STEPS = 100_000  # maximum number of integrator steps per output interval
-
-
-def exchange(instance: Any, plan: Plan, recording: Recording) -> None:
-    """Run an instance from begin to end; rows and events go to the recording.
-
-    Args:
-        instance: instantiated FMPy object of the FMU.
-        plan: settings of the simulation.
-        recording: recording to which rows and events are added.
-
-    Raises:
-        SolverError: the integration fails, a value is not finite, or an event does not end.
-    """
-    set_up(instance, plan)
-    run = _Exchange(instance, plan, recording, _Clock(instance, plan))
-    following, ended = run.update()
-    recording.begin(plan.begin)
-    if not ended:
-        _steps(run, following)
-    instance.terminate()
-
-
-def _steps(run: _Exchange, following: float) -> None:
-    """Integrate to the end, and stop at rows, events and jumps of inputs."""
-    plan, recording = run.plan, run.recording
-    jumps = plan.tracks.jumps
-    integrator = _integrator(run)
-    time = plan.begin
-    for end, row in list(with_points(plan.times, jumps).items())[1:]:
-        while time < end:
-            until = min(end, following)
-            fired, time = integrator.step(time, until)
-            run.clock.move(time)
-            wanted, ended = run.completed()
-            happens = bool(fired) or wanted or time >= following or time in jumps
-            if happens or ended or (row and time == end):
-                recording.row(time)
-            if happens and not ended:
-                following, ended = run.event(time, fired)
-                integrator.solver.reset(time)
-            if ended:
-                return recording.ended(time)
-    return None
-
-
-class _Clock:
-    """Setter of the time of an instance and of its inputs at this time."""
-
-    def __init__(self, instance: Any, plan: Plan) -> None:
-        self._instance = instance
-        self._all, self._smooth = plan.tracks.setter(instance), _setter(plan.tracks, instance)
-        self._after = plan.begin
-
-    def move(self, time: float) -> None:
-        """Set the time and continuous inputs, before a jump at this time unless it was made."""
-        self._instance.setTime(time)
-        self._smooth(time, time <= self._after)
-
-    def jump(self, time: float) -> None:
-        """Set all inputs to their values after the jumps at this time."""
-        self._after = time
-        self._all(time, True)
-
-
-def _setter(tracks: Tracks, instance: Any) -> Callable[[float, bool], None]:
-    return tracks.continuous().setter(instance)
-
-
-@dataclass(frozen=True, slots=True)
-class _Exchange:
-    """Calls of FMI 2.0 and 3.0 for model exchange."""
-
-    instance: Any
-    plan: Plan
-    recording: Recording
-    clock: _Clock
-
-    def completed(self) -> tuple[bool, bool]:
-        """Complete a step; return whether the FMU requests an event, and the end."""
-        if not self.plan.description.modelExchange.needsCompletedIntegratorStep:
-            return False, False
-        wanted, ended = self.instance.completedIntegratorStep()
-        return bool(wanted), bool(ended)
-
-    def event(self, time: float, fired: list[int]) -> tuple[float, bool]:
-        """Process an event; return the time of the next time event [s], and whether to end."""
-        self.instance.enterEventMode()
-        self.clock.jump(time)
-        following, ended = self.update()
-        self.recording.row(time)
-        self.recording.record_event(time, self._told(time, fired))
-        return following, ended
+            self.apply(time, True)
+        return self.update()
 
     def update(self) -> tuple[float, bool]:
-        """Iterate an event to convergence, and return to continuous-time mode."""
-        newer = self.plan.newer
-        update = self.instance.updateDiscreteStates if newer else self.instance.newDiscreteStates
+        """Iterate an event to convergence, and go on to the next step."""
+        name = "updateDiscreteStates" if self.plan.newer else "newDiscreteStates"
+        update = getattr(self.instance, name)
         for _ in range(_MOST_ITERATIONS):
             again, ended, _, _, known, next_time = update()
             if ended:
                 return math.inf, True
             if not again:
-                self.instance.enterContinuousTimeMode()
+                self.resume()
                 return (float(next_time) if known else math.inf), False
         raise SolverError(f"FMU {self.recording.name}: an event does not come to an end")
 
-    def _told(self, time: float, fired: list[int]) -> Iterator[tuple[str, str]]:
-        """Yield name and text of an event for the case that no discrete variable changes."""
-        names = [unknown.variable.name for unknown in self.plan.description.eventIndicators]
-        for k in fired:
-            name = names[k] if k < len(names) else self.recording.name
-            yield name, "state event"
-        if not fired and time not in self.plan.tracks.jumps:
-            yield self.recording.name, "event"
+    def resume(self) -> None:
+        """Leave event mode."""
+        self.instance.enterStepMode()
+
+    def unsaid(self, reached: Reached, following: float) -> list[tuple[str, str]]:
+        """Return name and text of an event for the case that no discrete variable changes."""
+        happened = reached.event or reached.time >= following
+        return [(self.recording.name, "event")] if happened else []
 
 
-@dataclass(slots=True)
-class _Steps:
-    """Integrator of FMPy.
+class _Older(_Run):
+    """Co-simulation of FMI 2.0: inputs with slopes if the FMU interpolates."""
 
-    Attributes:
-        solver: FMPy solver object.
-        bounded: callable that sets the stop time of the solver [s].
-        lost: errors of the FMU in callbacks of the solver.
-    """
+    def __init__(self, instance: Any, plan: Plan, recording: Recording) -> None:
+        super().__init__(instance, plan, recording, events=False)
+        self._held = not plan.description.coSimulation.canInterpolateInputs
 
-    solver: Any
-    bounded: Callable[[float], None]
-    lost: list[Exception]
+    def approach(self, begin: float, end: float) -> None:
+        self.apply((begin + end) / 2 if self._held else begin, True)
+        if self.plan.tracks.variables and not self._held:
+            references, slopes = self.plan.tracks.slopes(begin, end)
+            self.instance.setRealInputDerivatives(references, [1] * len(references), slopes)
 
-    def step(self, time: float, until: float) -> tuple[list[int], float]:
-        """Make a step; return the indices of indicators that changed sign, and the time [s]."""
+    def step(self, begin: float, end: float) -> Reached:
+        from fmpy.fmi1 import FMICallException
+        from fmpy.fmi2 import fmi2LastSuccessfulTime, fmi2Terminated
+
+        unit = self.instance
         try:
-            self.bounded(until)
-            _, roots, reached = self.solver.step(time, until)
-        except Exception as error:
-            raise (self.lost[0] if self.lost else error) from error
-        self.lost.clear()  # the solver has repeated discarded evaluations
-        reached = float(reached)
-        # relative tolerance 1e-14: some rounding errors of the time `until`
-        near = abs(reached - until) <= 1e-14 * max(1.0, abs(until))
-        return np.flatnonzero(roots).tolist(), until if near else reached
+            unit.doStep(currentCommunicationPoint=begin, communicationStepSize=end - begin)
+        except FMICallException as error:
+            if error.status != _DISCARD or not unit.getBooleanStatus(fmi2Terminated):
+                raise
+            last = float(unit.getRealStatus(fmi2LastSuccessfulTime))
+            self.arrive(last)
+            return Reached(last, terminated=True)
+        return Reached(end)
+
+    def arrive(self, end: float) -> None:
+        if self._held:
+            self.apply(end, False)
 
 
-def _integrator(run: _Exchange) -> _Steps:
-    instance, plan, lost = run.instance, run.plan, list[Exception]()
-    newer = plan.newer
-    rates = instance.getContinuousStateDerivatives if newer else instance.getDerivatives
+class _Newer(_Run):
+    """Co-simulation of FMI 3.0, with event mode if the FMU has one."""
+
+    def __init__(
+        self, instance: Any, plan: Plan, recording: Recording, watch: Intermediate
+    ) -> None:
+        offered = plan.description.coSimulation
+        super().__init__(instance, plan, recording, events=offered.hasEventMode)
+        self._watch, self._between = watch, self.apply_continuous if self.events else self.apply
+        watch.apply = self.apply_continuous
+        watch.look = recording.row if plan.rows == "solver" else None
+
+    def approach(self, begin: float, end: float) -> None:
+        self._between((begin + end) / 2, True)
+
+    def step(self, begin: float, end: float) -> Reached:
+        event, terminated, early, last = self.instance.doStep(
+            currentCommunicationPoint=begin, communicationStepSize=end - begin
+        )
+        if self._watch.lost:
+            raise self._watch.lost[0]
+        time = float(last) if early and last < end else end
+        return Reached(time, bool(event) and self.events, bool(terminated))
+
+    def arrive(self, end: float) -> None:
+        self._between(end, False)
+
+    def update(self) -> tuple[float, bool]:
+        following, ended = super().update()
+        if ended:
+            raise SolverError(f"FMU {self.recording.name} asks for the end at an event")
+        return following, False
+
+
+class _Exchange(_Run):
+    """Model exchange: an integrator of FMPy makes the steps and locates the events."""
+
+    def __init__(
+        self, instance: Any, plan: Plan, recording: Recording, check: Callable[[], object]
+    ) -> None:
+        super().__init__(instance, plan, recording, events=True)
+        self._after, self._check = plan.begin, check
+        self._solver: Any = None
+        described = plan.description
+        names = [unknown.variable.name for unknown in described.eventIndicators]
+        unnamed = described.numberOfEventIndicators - len(names)  # FMI 2.0 names none
+        self._indicators = [*names, *[recording.name] * unnamed]
+
+    def start(self) -> tuple[float, bool]:
+        following, ended = self.update()
+        self._solver = None if ended else _solver(self)
+        return following, ended
+
+    def move(self, time: float) -> None:
+        """Set the time and continuous inputs, before a jump at this time unless it was made."""
+        self._check()
+        self.instance.setTime(time)
+        self.apply_continuous(time, time <= self._after)
+
+    def step(self, begin: float, end: float) -> Reached:
+        _, roots, time = self._solver.step(begin, end)
+        # relative tolerance 1e-14: some rounding errors of the time `end`
+        near = abs(time - end) <= 1e-14 * max(1.0, abs(end))
+        time = end if near else float(time)
+        self.move(time)
+        wanted = ended = False
+        if self.plan.description.modelExchange.needsCompletedIntegratorStep:
+            wanted, ended = self.instance.completedIntegratorStep()
+        fired = tuple(self._indicators[k] for k in np.flatnonzero(roots))
+        return Reached(time, bool(fired or wanted), bool(ended), fired)
+
+    def event(self, time: float, jumped: bool) -> tuple[float, bool]:
+        self._after = time
+        found = super().event(time, True)
+        self._solver.reset(time)
+        return found
+
+    def resume(self) -> None:
+        self.instance.enterContinuousTimeMode()
+
+    def unsaid(self, reached: Reached, following: float) -> list[tuple[str, str]]:
+        if reached.fired or reached.time in self.jumps:
+            return [(name, "state event") for name in reached.fired]
+        return [(self.recording.name, "event")]
+
+
+def _solver(run: _Exchange) -> Any:
+    """Return the integrator of FMPy."""
+    instance, plan = run.instance, run.plan
     common: dict[str, Any] = {
         "nx": plan.description.numberOfContinuousStates,
         "nz": plan.description.numberOfEventIndicators,
         "get_x": instance.getContinuousStates,
         "set_x": instance.setContinuousStates,
-        "get_dx": rates,
+        "get_dx": (
+            instance.getContinuousStateDerivatives if plan.newer else instance.getDerivatives
+        ),
         "get_z": instance.getEventIndicators,
         "input": SimpleNamespace(apply=lambda time: None),
     }
     if plan.solver == "Euler":
         from fmpy.simulation import ForwardEuler
 
-        return _Steps(ForwardEuler(**common), lambda until: None, lost)
-    return _cvode(run, common, lost)
-
-
-def _cvode(run: _Exchange, common: dict[str, Any], lost: list[Exception]) -> _Steps:
-    from fmpy.sundials import CVodeSolver
-
-    class Solver(CVodeSolver):  # type: ignore[misc]
-        """CVODE that stores errors of the FMU and repeats steps that the FMU discards."""
-
-        def f(self, *arguments: Any) -> int:
-            return _keep(super().f, arguments, lost)
-
-        def g(self, *arguments: Any) -> int:
-            return _keep(super().g, arguments, lost)
-
-    plan = run.plan
-    solver = Solver(
+        return ForwardEuler(**common)
+    return _cvode_class()(
         **common,
-        get_nominals=run.instance.getNominalsOfContinuousStates,
-        set_time=run.clock.move,
+        get_nominals=instance.getNominalsOfContinuousStates,
+        set_time=run.move,
         startTime=plan.begin,
         maxStep=max(np.diff(plan.times), default=math.inf),
         relativeTolerance=plan.tolerance,
         maxNumSteps=_MOST_STEPS,
     )
-    _quiet(solver)
-    return _Steps(solver, lambda until: _stop_at(solver, until), lost)
 
 
-def _keep(call: Callable[..., int], arguments: tuple[Any, ...], lost: list[Exception]) -> int:
-    """Return the status for CVODE: 0 success, 1 shorter step, -1 unrecoverable error."""
-    try:
-        return call(*arguments)
-    except Exception as error:
-        lost.append(error)
-        return 1 if getattr(error, "status", None) == _DISCARD else -1
-
-
-def _quiet(solver: Any) -> None:
-    """Send error messages of CVODE to the solver object only, not to the terminal."""
-    from ctypes import c_void_p
-
-    from fmpy.sundials.libraries import sundials_core
+@lru_cache(maxsize=1)
+def _cvode_class() -> Any:
+    """Return the class of CVODE with errors of the FMU and a time at which steps end."""
+    from fmpy.sundials import CVodeSolver
+    from fmpy.sundials.libraries import sundials_core, sundials_cvode
     from fmpy.sundials.sundials_context import SUNContext_PushErrHandler
 
-    clear = sundials_core.SUNContext_ClearErrHandlers
-    clear.argtypes = [c_void_p]
-    clear(solver.sunctx)
-    SUNContext_PushErrHandler(solver.sunctx, solver.ehfun_, None)
+    stop, clear = sundials_cvode.CVodeSetStopTime, sundials_core.SUNContext_ClearErrHandlers
+    stop.argtypes, clear.argtypes = [ctypes.c_void_p, ctypes.c_double], [ctypes.c_void_p]
 
+    class Solver(CVodeSolver):  # type: ignore[misc]
+        """CVODE that passes on errors of the FMU and repeats steps that the FMU discards."""
 
-def _stop_at(solver: Any, until: float) -> None:
-    from ctypes import c_double, c_void_p
+        def __init__(self, **settings: Any) -> None:
+            self.lost: list[BaseException] = []  # errors in callbacks
+            super().__init__(**settings)
+            clear(self.sunctx)  # errors go to the solver object only, not to the terminal
+            SUNContext_PushErrHandler(self.sunctx, self.ehfun_, None)
 
-    from fmpy.sundials.libraries import sundials_cvode
+        def f(self, *arguments: Any) -> int:
+            return self.kept(super().f, arguments)
 
-    stop = sundials_cvode.CVodeSetStopTime
-    stop.argtypes = [c_void_p, c_double]
-    stop(solver.cvode_mem, until)
+        def g(self, *arguments: Any) -> int:
+            return self.kept(super().g, arguments)
+
+        def kept(self, call: Callable[..., int], arguments: tuple[Any, ...]) -> int:
+            """Return the status for CVODE: 0 success, 1 shorter step, -1 unrecoverable error."""
+            try:
+                return call(*arguments)
+            except BaseException as error:  # control-C too, which C code cannot propagate
+                self.lost.append(error)
+                return 1 if getattr(error, "status", None) == _DISCARD else -1
+
+        def step(self, t: float, tNext: float) -> Any:
+            stop(self.cvode_mem, tNext)
+            try:
+                found = super().step(t, tNext)
+            except Exception as error:
+                raise (self.lost[0] if self.lost else error) from error
+            self.lost.clear()  # the solver has repeated discarded evaluations
+            return found
+
+    return Solver
 
 
 # Messages of FMUs, each passed to the simulation that runs in the same thread.
-#
-# FMPy stores a single logger per process in a C library and holds no reference to its Python
-# function. The logger here is therefore a function that is never freed.
 
 
-Listener = Callable[[int, str], None]
-"""Callable with the status and the text of a message."""
-
-_LISTENERS: dict[int, Listener] = {}  # listeners by thread identifier
-_LOCK, _LOADING = threading.Lock(), threading.Lock()
+# callable with the status and the text of a message
+_LISTENER: ContextVar[Callable[[int, str], None] | None] = ContextVar("listener", default=None)
+_LOADING = threading.Lock()
 
 
-@contextmanager
-def listening(listener: Listener) -> Iterator[None]:
-    """Pass messages of FMUs in this thread to `listener` within the context."""
-    thread = threading.get_ident()
-    with _LOCK:
-        before = _LISTENERS.get(thread)
-        _LISTENERS[thread] = listener
-    try:
-        yield
-    finally:
-        with _LOCK:
-            if before is None:
-                del _LISTENERS[thread]
-            else:
-                _LISTENERS[thread] = before
-
-
-@contextmanager
+@contextlib.contextmanager
 def instance(description: Any, folder: str, kind: str, watch: Callable[..., None]) -> Iterator[Any]:
     """Instantiate an FMU of FMI 2.0 or 3.0, and free the instance at the end of the context.
 
@@ -504,99 +457,56 @@ def instance(description: Any, folder: str, kind: str, watch: Callable[..., None
         kind: "CoSimulation" or "ModelExchange".
         watch: intermediate update callback, used if the FMU supports it (FMI 3.0).
     """
-    from fmpy import fmi2, fmi3
+    from fmpy.simulation import instantiate_fmu
 
-    stepped, newer = kind == "CoSimulation", description.fmiVersion.startswith("3")
-    interface = description.coSimulation if stepped else description.modelExchange
-    kinds = {
-        ("2", True): fmi2.FMU2Slave,
-        ("2", False): fmi2.FMU2Model,
-        ("3", True): fmi3.FMU3Slave,
-        ("3", False): fmi3.FMU3Model,
-    }
-    with _kept_directory():
-        fmu = kinds[description.fmiVersion[0], stepped](
-            guid=description.guid,
-            modelIdentifier=interface.modelIdentifier,
-            unzipDirectory=folder,
-            instanceName=description.modelName,
+    offered = description.coSimulation if kind == "CoSimulation" else None
+    events = bool(offered and offered.hasEventMode)
+    newer = description.fmiVersion.startswith("3")
+    # FMPy changes the working directory on loading; one thread at a time
+    with _LOADING, contextlib.chdir("."):
+        if not newer:
+            _log_older()
+        fmu = instantiate_fmu(
+            folder,
+            description,
+            kind,
+            # FMUs of other tools would log every call
+            debug_logging=str(description.generationTool).startswith("mbs"),
+            logger=_log if newer else None,
+            event_mode_used=events,
+            early_return_allowed=events,
+            intermediate_update=watch if offered and offered.providesIntermediateUpdate else None,
         )
-    # FMUs of other tools would log every call
-    says_why = str(description.generationTool).startswith("mbs")
-    if newer:
-        offers = _offer(interface, watch) if stepped else {}
-        fmu.instantiate(loggingOn=says_why, logMessage=_log_newer, **offers)
-    else:
-        fmu.instantiate(callbacks=_callbacks(), loggingOn=says_why)
     try:
         yield fmu
     finally:
         fmu.freeInstance()
 
 
-@contextmanager
-def _kept_directory() -> Iterator[None]:
-    """Restore the working directory, which FMPy changes on loading; one thread at a time."""
-    with _LOADING:
-        before = os.getcwd()
-        try:
-            yield
-        finally:
-            os.chdir(before)
+def _log_older() -> None:
+    """Pass messages of FMI 2.0 to `_log`.
 
-
-def _offer(interface: Any, watch: Callable[..., None]) -> dict[str, Any]:
-    """Return the host capabilities for the instantiation of an FMI 3.0 co-simulation."""
-    events = bool(interface.hasEventMode)
-    found: dict[str, Any] = {"eventModeUsed": events, "earlyReturnAllowed": events}
-    if interface.providesIntermediateUpdate:
-        found["intermediateUpdate"] = watch
-    return found
-
-
-@lru_cache(maxsize=1)
-def _functions() -> tuple[Any, Any, Any]:
-    """Return the C callbacks for messages and memory, made once and never freed."""
-    from fmpy import fmi2
-
-    return (
-        fmi2.fmi2CallbackLoggerTYPE(_log),
-        fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc),
-        fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free),
-    )
-
-
-def _callbacks() -> Any:
-    """Return the C callbacks of an FMI 2.0 instance.
-
-    The logger proxy of FMPy holds only the last logger, which other users of FMPy may have freed.
-    The logger is therefore set again for every instance.
+    FMPy stores a single logger per process in a C library and holds no reference to its Python
+    function. The logger here is therefore a function that is never freed. It is set for every
+    instance, because other users of FMPy may have set theirs.
     """
     from fmpy import fmi2
     from fmpy.logging import addLoggerProxy
 
-    logger, allocate, free = _functions()
-    callbacks = fmi2.fmi2CallbackFunctions(logger=logger, allocateMemory=allocate, freeMemory=free)
-    with _LOCK:
-        addLoggerProxy(ctypes.byref(callbacks))
-    return callbacks
+    addLoggerProxy(ctypes.byref(fmi2.fmi2CallbackFunctions(logger=_older_logger())))
 
 
-def _log(environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
+@lru_cache(maxsize=1)
+def _older_logger() -> Any:
     from fmpy import fmi2
 
-    listener = _LISTENERS.get(threading.get_ident())
-    if listener is None:
-        fmi2.printLogMessage(environment, name, status, category, message)
-    else:
-        listener(status, message.decode("utf-8", "replace"))
+    return fmi2.fmi2CallbackLoggerTYPE(lambda unit, name, *message: _log(unit, *message))
 
 
-def _log_newer(environment: Any, status: int, category: bytes, message: bytes) -> None:
-    """Pass on a message of FMI 3.0, which needs no logger proxy."""
+def _log(environment: Any, status: int, category: bytes, message: bytes) -> None:
     from fmpy import fmi3
 
-    listener = _LISTENERS.get(threading.get_ident())
+    listener = _LISTENER.get()
     if listener is None:
         fmi3.printLogMessage(environment, status, category, message)
     else:
@@ -671,10 +581,11 @@ def fmu(
     """
     file = _path(path)
     start = state_of(start)
-    for what, values in (("parameters", parameters), ("start", start)):
-        if not isinstance(values, Mapping | None) and not (
-            what == "start" and isinstance(values, State)
-        ):
+    for what, values, kinds in (
+        ("parameters", parameters, Mapping | None),
+        ("start", start, Mapping | State | None),
+    ):
+        if not isinstance(values, kinds):
             raise ModelError(f"{what} is {quoted(values)}; give a dict of names to values")
     if not isinstance(inputs, Mapping | Result | None):
         raise ModelError(f"inputs is {quoted(inputs)}; give a dict of names to values, or a Result")
@@ -787,11 +698,7 @@ def _between_steps(folder: str, plan: Plan) -> set[str]:
 def _record(folder: str, plan: Plan, record: Sequence[str] | None) -> list[Any]:
     """Return the variables to record."""
     described = plan.description
-    known = {
-        v.name: v
-        for v in described.modelVariables
-        if v.type in NUMBERS and v.causality != "independent"
-    }
+    known = recordable(described)
     if plan.rows == "solver":
         between = _between_steps(folder, plan)
         known = {name: v for name, v in known.items() if name in between}
@@ -815,14 +722,15 @@ def _simulate(folder: str, plan: Plan, variables: list[Any], *, quiet: bool) -> 
     name, watch = plan.description.modelName, Intermediate()
     recording: Recording | None = None
     stop: SolverError | Interrupted | None = None
+    token = _LISTENER.set(listen)
     with progress(name, plan.begin, plan.end, quiet=quiet) as reached:
         try:
-            with listening(listen), instance(plan.description, folder, plan.kind, watch) as unit:
+            with (
+                control_c() as check,
+                instance(plan.description, folder, plan.kind, watch) as unit,
+            ):
                 recording = recording_of(unit, plan.description, variables, reached)
-                if plan.kind == "CoSimulation":
-                    co_simulate(unit, plan, recording, watch)
-                else:
-                    exchange(unit, plan, recording)
+                simulate(unit, plan, recording, watch, check)
         except SolverError as error:
             stop = error
         except MbsError:
@@ -834,6 +742,8 @@ def _simulate(folder: str, plan: Plan, variables: list[Any], *, quiet: bool) -> 
             said = "; ".join(dict.fromkeys(messages)) or str(error)
             stop = SolverError(f"FMU {name} stopped: {said}")
             stop.__cause__ = error
+        finally:
+            _LISTENER.reset(token)
     if stop is not None:
         if recording is not None and recording.times:
             stop.time = recording.times[-1]

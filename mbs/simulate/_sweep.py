@@ -16,7 +16,7 @@ import weakref
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, as_completed
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, overload
 
@@ -32,6 +32,7 @@ from mbs.progress import progress
 from mbs.result import Result, State, optional_module, state_of
 from mbs.simulate._fmu import fmu
 from mbs.simulate.fmu_variables import numbers_of
+from mbs.simulate.options import SimulatorArguments
 from mbs.simulate.simulator import run, simulator_of
 from mbs.text import did_you_mean, error_text, quoted
 
@@ -214,7 +215,7 @@ def study_of(
     return {"model": name, "content": digest, "cases": list(cases), "options": described}
 
 
-_LAWS = ("tau", "motion", "u", "method")
+_LAWS = tuple(field.name for field in fields(SimulatorArguments) if field.kw_only)
 """Options common to all cases. Efforts and inputs of a case are numeric inputs of the simulator, so
 that all cases have the same equations."""
 

@@ -1,8 +1,7 @@
 """Checks of durations, steps and tolerances of simulations."""
 
+import math
 import numbers
-
-import numpy as np
 
 from mbs.errors import ModelError
 from mbs.text import quoted
@@ -24,7 +23,7 @@ def positive(value: object, what: str, where: str) -> float:
     """
     if isinstance(value, numbers.Real) and not isinstance(value, bool):
         number = float(value)
-        if np.isfinite(number) and number > 0:
+        if math.isfinite(number) and number > 0:
             return number
     raise ModelError(f"{where}: {what} is {quoted(value)}; give a finite positive number")
 

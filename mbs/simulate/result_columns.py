@@ -39,17 +39,22 @@ _Column = tuple[str, str, str, int]
 """Name and unit of a column, name of the block of its values, index in the block."""
 
 
+_StateNames = tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class ResultColumns:
     """Columns of a result: name, unit and source of the values.
 
     Attributes:
         units: unit of each column by name, in order.
+        states: names of the positions, velocities and states of components.
         places: index of each column in the concatenated blocks.
         blocks: names of the blocks that the columns use.
     """
 
     units: Mapping[str, str]
+    states: _StateNames
     places: NDArray[np.int64]
     blocks: frozenset[str]
 
@@ -94,6 +99,7 @@ def columns_of(system: System, outputs: tuple[str, ...] | None) -> ResultColumns
         every = _named_columns(system, every, outputs)
     return ResultColumns(
         {name: unit for name, unit, *_ in every},
+        _state_names(system),
         np.array([first[block] + index for *_, block, index in every], dtype=np.int64),
         frozenset(block for *_, block, _ in every),
     )
@@ -113,7 +119,7 @@ def _named_columns(
     return [known[name] for name in outputs]
 
 
-def _state_names(system: System) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+def _state_names(system: System) -> _StateNames:
     """Return the names of positions, velocities and states of components."""
     return (
         tuple(row.name for row in system.coordinates),
@@ -146,6 +152,11 @@ def require_state_of(system: System, state: State) -> None:
             )
 
 
+def _joined(parts: Sequence[Array]) -> Array:
+    """Return the rows of all parts in one array, which is the part itself if there is one."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+
 def result_of(
     system: System,
     segments: Sequence[Segment],
@@ -166,13 +177,13 @@ def result_of(
         allowed: tolerances of the motion.
         note: beginning of `Result.info["note"]`, or empty text.
     """
-    times = np.concatenate([segment.times for segment in segments])
-    x = np.vstack([segment.x for segment in segments])
+    times = _joined([segment.times for segment in segments])
+    x = _joined([segment.x for segment in segments])
     nq, n, np_own = system.nq, system.nq + system.nv, len(system.parameters)
-    blocks = [x]
+    blocks, modes = [x], modes_of(segments)
     if columns.blocks != {"x"}:
         parts = [segment.observe(p) for segment in segments]
-        a, tau, u, y, efforts, *scalars = (np.vstack(rows) for rows in zip(*parts, strict=True))
+        a, tau, u, y, efforts, *scalars = map(_joined, zip(*parts, strict=True))
         sensors = np.empty((len(times), 0))
         if "sensors" in columns.blocks:
             every = np.repeat(p[:np_own, None], len(times), axis=1)
@@ -181,8 +192,8 @@ def result_of(
             sensors = sensor_values(system, {**motion, "a": a.T, "tau": whole.T})
         elif system.sensors:
             sensors = np.empty((len(times), sum(len(one.columns) for one in system.sensors)))
-        blocks += [a, tau, u, y, *scalars, sensors, modes_of(segments), efforts]
-    values = np.hstack(blocks)[:, columns.places]
+        blocks += [a, tau, u, y, *scalars, sensors, modes, efforts]
+    values = np.concatenate(blocks, axis=1)[:, columns.places]
     part_events = [event for segment in segments for event in segment.part_events]
     events = list_events(system, segments[0].contact, part_events)
     stopped = None if stop is None or stop.time is None else (stop.time, str(stop))
@@ -201,5 +212,5 @@ def result_of(
         events=events,
         system=system,
         stopped=stopped,
-        states=RecordedStates(_state_names(system), x, modes_of(segments)),
+        states=RecordedStates(columns.states, x, modes),
     )

@@ -19,20 +19,19 @@ from numpy.typing import NDArray
 
 from mbs.arguments import MadeOnce, names_given, values_given
 from mbs.assembly import System
-from mbs.assembly.degrees import like_degrees
 from mbs.assembly.model_function import require_system
 from mbs.assembly.pickling import Packed, content_of, packed, unpacked
-from mbs.assembly.variable_names import GUESSES, POSITIONS
+from mbs.assembly.variable_names import GUESSES, POSITIONS, like_degrees
 from mbs.errors import Interrupted, ModelError
 from mbs.loops.configuration import Guess, Start, Values, start, start_position, start_velocity
 from mbs.models._inverse_dynamics import bias
 from mbs.models.state.signals import (
-    Effort,
     by_name,
     effort_function,
     given_inputs,
 )
 from mbs.models.state.tree import FullState, full_state
+from mbs.options import arguments_of, group_values, method_arguments_of
 from mbs.progress import progress
 from mbs.result import (
     Result,
@@ -45,10 +44,21 @@ from mbs.simulate.arguments import count_steps, positive
 from mbs.simulate.contact_motion import require_contacts_possible
 from mbs.simulate.device_inputs import device_states, input_function
 from mbs.simulate.equation_cache import cached_on_disk
-from mbs.simulate.prescribed import Motion, prescribed_motions, start_positions
+from mbs.simulate.options import (
+    InitialBranch,
+    InitialMotion,
+    IntegrationMethod,
+    Laws,
+    MotionArguments,
+    ParameterValues,
+    RunArguments,
+    SimulatorArguments,
+    Steps,
+)
+from mbs.simulate.prescribed import prescribed_motions, start_positions
 from mbs.simulate.result_columns import ResultColumns, columns_of, require_state_of, result_of
 from mbs.simulate.segments import integrate_segments, system_parameters
-from mbs.simulate.tolerances import Tolerance, tolerances_of
+from mbs.simulate.tolerances import tolerances_of
 from mbs.solvers.problem import METHODS
 from mbs.text import quoted
 
@@ -82,39 +92,24 @@ class Simulator(MadeOnce):
 
     settings = ("system",)
 
-    def __init__(
-        self,
-        system: System,
-        inputs: Sequence[str] = (),
-        outputs: Sequence[str] | None = None,
-        *,
-        tau: Effort = None,
-        motion: Motion = None,
-        u: Effort = None,
-        method: str = "dopri5",
-    ) -> None:
+    @method_arguments_of(SimulatorArguments)
+    def __init__(self, options: SimulatorArguments) -> None:
         """Check and store the arguments that are common to all motions.
 
         Args:
-            system: open or closed system.
-            inputs: names of efforts and component inputs whose constant value is set in each call,
-                such as "j1.tau" and "motor.voltage". The values replace those of `tau` and `u`.
-            outputs: names of the columns of results, such as "j1.q"; all columns by default.
-                Accelerations, efforts, energies and sensors without column are not computed.
-            tau: joint efforts, as in `run`.
-            motion: prescribed motions, as in `run`.
-            u: inputs of devices, as in `run`.
-            method: integration method, as in `run`.
+            options: see `SimulatorArguments`.
 
         Raises:
             ModelError: `system` is not a System, a name is unknown, or a law has the wrong form.
         """
+        system, method, outputs = options.system, options.method, options.outputs
         require_system(system)
         self.system = system
-        self._motions = prescribed_motions(system, motion)
+        self._motions = prescribed_motions(system, options.motion)
         require_contacts_possible(system, self._motions)
-        self._effort, self._inputs = effort_function(system, tau), input_function(system, u)
-        self._given = given_inputs(system, inputs)
+        self._effort = effort_function(system, options.tau)
+        self._inputs = input_function(system, options.u)
+        self._given = given_inputs(system, options.inputs)
         if not isinstance(method, str) or method not in METHODS:
             raise ModelError(
                 f"{system.name}: method is {quoted(method)}; use {', or '.join(map(repr, METHODS))}"
@@ -145,53 +140,30 @@ class Simulator(MadeOnce):
         plain = self._given, self._outputs, self._method
         return _unpickled_simulator, packed((self.system, laws, plain))
 
-    def __call__(
-        self,
-        duration: float,
-        *,
-        q0: Start = None,
-        v0: Start = None,
-        z0: Start = None,
-        guess: Guess = None,
-        inputs: Mapping[str, float] | None = None,
-        parameters: Mapping[str, float] | None = None,
-        step: float = 0.01,
-        tolerance: Tolerance = 1e-8,
-        max_step: float | None = None,
-        quiet: bool = True,
-    ) -> Result:
+    @method_arguments_of(MotionArguments)
+    def __call__(self, options: MotionArguments) -> Result:
         """Simulate one motion.
 
         Args:
-            duration: duration [s].
-            q0: initial positions, as in `run`.
-            v0: initial velocities, as in `run`.
-            z0: initial states of devices, as in `run`.
-            guess: approximate positions that select the branch of the loops, as in `run`.
-            inputs: values of `Simulator.inputs` by name. An input without value has its default.
-            parameters: values of parameters by name, as in `run`.
-            step: time between the rows of the result [s].
-            tolerance: expected error of the motion, as in `run`.
-            max_step: longest integration step [s], as in `run`.
-            quiet: Whether to hide the progress bar.
+            options: see `MotionArguments`.
 
         Raises:
             ModelError, CompilerError, Unclosable, SolverError, Interrupted: as in `run`.
         """
         system, motions = self.system, self._motions
-        duration = positive(duration, "duration [s]", system.name)
-        allowed = tolerances_of(system, tolerance)
+        duration = positive(options.duration, "duration [s]", system.name)
+        allowed = tolerances_of(system, options.tolerance)
         longest = math.inf
-        if max_step is not None:
-            longest = positive(max_step, "max_step [s]", system.name)
-        elif _is_opaque(self._effort) or _is_opaque(self._inputs):
+        if options.max_step is not None:
+            longest = positive(options.max_step, "max_step [s]", system.name)
+        elif self._has_opaque_laws:
             longest = duration / _MIN_STEPS
-        steps = count_steps(duration, positive(step, "step [s]", system.name), system.name)
-        own = system.parameter_values(parameters)
-        p = np.array([*own, *self._values(inputs)])
+        steps = count_steps(duration, positive(options.step, "step [s]", system.name), system.name)
+        own = system.parameter_values(options.parameters)
+        p = np.array([*own, *self._values(options.inputs)])
         begin, modes = 0.0, None
-        q0, guess = state_of(q0), state_of(guess)
-        speeds, devices = velocities_of(v0), device_states_of(z0)
+        q0, guess = state_of(options.q0), state_of(options.guess)
+        speeds, devices = velocities_of(options.v0), device_states_of(options.z0)
         if isinstance(q0, State):
             require_state_of(system, q0)
             begin, modes = q0.time, np.array(q0.modes)
@@ -202,7 +174,7 @@ class Simulator(MadeOnce):
         x0 = np.concatenate([*_consistent_start(system, *placed, p, guess), z])
         times = np.linspace(begin, begin + duration, steps + 1)
         rtol, atol, sizes = allowed.of_step()
-        with progress(f"simulating {system.name}", 0.0, duration, quiet=quiet) as reached:
+        with progress(f"simulating {system.name}", 0.0, duration, quiet=options.quiet) as reached:
             segments, stop = integrate_segments(
                 system,
                 self._equations,
@@ -243,6 +215,11 @@ class Simulator(MadeOnce):
             )
         defaults = [one.default for one in self._given]
         return list(by_name(self.system, "inputs", inputs, quantities, defaults))
+
+    @functools.cached_property
+    def _has_opaque_laws(self) -> bool:
+        """Whether pulses of the laws cannot be located beforehand."""
+        return _is_opaque(self._effort) or _is_opaque(self._inputs)
 
     @functools.cached_property
     def _key(self) -> Packed | None:
@@ -331,24 +308,8 @@ def _consistent_start(
     return found
 
 
-def run(
-    system: System,
-    duration: float,
-    *,
-    q0: Start = None,
-    v0: Start = None,
-    tau: Effort = None,
-    motion: Motion = None,
-    u: Effort = None,
-    z0: Start = None,
-    guess: Guess = None,
-    parameters: Mapping[str, float] | None = None,
-    step: float = 0.01,
-    tolerance: Tolerance = 1e-8,
-    max_step: float | None = None,
-    method: str = "dopri5",
-    quiet: bool = False,
-) -> Result:
+@arguments_of(RunArguments)
+def run(options: RunArguments) -> Result:
     """Simulate a system from initial positions and velocities under joint efforts and motions.
 
     The forward dynamics are integrated by a one-step method with error control. After every step,
@@ -359,45 +320,7 @@ def run(
     a `Result` of the rows before the stop. Its `stopped` contains the time and the error message.
 
     Args:
-        system: open or closed system.
-        duration: duration [s].
-        q0: initial positions by coordinate name [rad or m]; the other coordinates are as in the
-            assembled configuration. In a closed system the independent positions are kept and the
-            loops are closed; a complete configuration is used unchanged. A `State` of
-            `Result.state` continues that motion with its time, velocities, component states and
-            modes. A `Result` is replaced by its last state.
-        v0: initial velocities by name [rad/s or m/s]; the others are zero. In a closed system they
-            may be of any joints, and the others follow. A `State` or `Result` is also accepted.
-        tau: joint efforts [N m or N]: dict of constants by motor name, or a function of (t, q, v)
-            made of CasADi operations, or a casadi.Function. A function returns efforts (nv, 1),
-            zero for joints without motor, or a dict by joint name, also of joints without motor.
-        motion: prescribed motions by name: "j1.q" for a position, "j1.v" for a velocity, "j1.a"
-            for an acceleration. Each law is a number, a smooth function of t made of CasADi
-            operations, or a signal of a component (the Signal or its name, such as "filter.q")
-            that depends on component states and parameters only. The column `j1.tau` is the total
-            effort, including the effort of the drive.
-        u: inputs of the devices of drive lines, such as voltages: dict of constants by device name,
-            or a function of (t, q, v) as for tau. The default is `system.u_default`. The efforts of
-            the devices are added to tau.
-        z0: initial states of devices by name, such as `motor.i`; the others have their default.
-            A `State` or `Result` is also accepted.
-        guess: approximate initial positions of other joints, which select the branch on which the
-            loops are closed.
-        parameters: values of parameters by name; the others have their defaults.
-        step: time between the rows of the result [s]; it does not change the accuracy.
-        tolerance: expected error of the motion [rad, m, rad/s or m/s]. The error of one step is
-            limited to 1/25 of this value, and to 1/1000 relative to large coordinates. A dict sets
-            tolerances by unit, such as "rad" and "m/s", and by name, such as "j1.q"; "others" is
-            for the other states. A pair is an absolute and a relative tolerance.
-            `result.info["note"]` names positions that move by less than 100 tolerances, and starts
-            that look like degrees.
-        max_step: longest integration step [s]. By default error control, the times at which laws
-            jump, and short laws limit the steps. If a law calls a Callback or an external function,
-            whose jumps cannot be located, the default is duration / 1000. Set it if a law is
-            smooth and short in space, such as a narrow potential well.
-        method: "dopri5", the explicit pair of Dormand and Prince, or "rodas", the linearly implicit
-            RODAS5P for stiff systems.
-        quiet: Whether to hide the progress bar.
+        options: see `RunArguments`.
 
     Returns:
         Result with `name.q`, `name.v`, `name.a` and `name.tau` of every coordinate, and
@@ -416,19 +339,9 @@ def run(
         Interrupted: control-C was pressed. It is a KeyboardInterrupt; `result` contains the rows
             that were reached.
     """
-    simulator = simulator_of(system, tau=tau, motion=motion, u=u, method=method)
-    return simulator(
-        duration,
-        q0=q0,
-        v0=v0,
-        z0=z0,
-        guess=guess,
-        parameters=parameters,
-        step=step,
-        tolerance=tolerance,
-        max_step=max_step,
-        quiet=quiet,
-    )
+    simulator = simulator_of(options.system, **group_values(options, Laws, IntegrationMethod))
+    given = group_values(options, InitialMotion, InitialBranch, ParameterValues, Steps)
+    return simulator(options.duration, **given, quiet=options.quiet)
 
 
 def simulator_of(system: System, inputs: Sequence[str] = (), **laws: Any) -> Simulator:

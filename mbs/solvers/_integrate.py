@@ -4,7 +4,8 @@ import ctypes
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from contextlib import nullcontext
+from dataclasses import dataclass, field
 from typing import Any
 
 import casadi
@@ -90,6 +91,9 @@ class IntegrationCode:
         spent: time of the interpreted runs so far [s].
         source: C code; None until it is written.
         instructions: number of instructions of all functions.
+        machine_code: one callable per function that returns a new evaluation of its machine code,
+            which has scratch memory of its own; None if the function is missing. Empty until the
+            functions are compiled.
     """
 
     equations: Equations
@@ -98,6 +102,7 @@ class IntegrationCode:
     spent: float = 0.0
     source: str | None = None
     instructions: int = field(init=False)
+    machine_code: tuple[Callable[[], Any] | None, ...] = ()
 
     def __post_init__(self) -> None:
         every = (g for f in self.equations.all for g in (f, *f.find_functions()))
@@ -147,25 +152,35 @@ class IntegrationCode:
     def evaluations(self) -> tuple[Any, ...]:
         """Return the functions in the form that the run-time library calls, None for missing ones.
 
-        They are compiled or interpreted, in the order of `driver_model` in driver.h: rhs, project,
-        jacobian, indicators, rates, jump, approaches, and rows, forces and regularity of the
-        `Passage`.
+        They are compiled or interpreted, in the order of `_in_order`.
         """
-        own, library = self.equations, self.library
-        through = own.passage
+        library = self.library
+        if library is None:
+            return tuple(
+                None if function is None else interpreted_evaluation(function, _raise_fatal)
+                for function in self._in_order()
+            )
+        if not self.machine_code:
+            self.machine_code = tuple(
+                None if function is None else compiled_evaluation(function, library)
+                for function in self._in_order()
+            )
+        return tuple(
+            None if evaluation is None else evaluation() for evaluation in self.machine_code
+        )
+
+    def _in_order(self) -> tuple[casadi.Function | None, ...]:
+        """Return the functions in the order of `driver_model` in driver.h, None for missing ones.
+
+        They are rhs, project, jacobian, indicators, rates, jump, approaches, and rows, forces and
+        regularity of the `Passage`.
+        """
+        own, through = self.equations, self.equations.passage
         last = (
             (None,) * 3 if through is None else (through.rows, through.forces, through.regularity)
         )
         changes = own.indicators, own.rates, own.jump, own.approaches
-
-        def evaluation(function: casadi.Function | None) -> Any:
-            if function is None:
-                return None
-            if library is None:
-                return interpreted_evaluation(function, _raise_fatal)
-            return compiled_evaluation(function, library)
-
-        return tuple(map(evaluation, (own.rhs, own.project, own.jacobian, *changes, *last)))
+        return own.rhs, own.project, own.jacobian, *changes, *last
 
 
 # Evaluations for the run-time library, and the integration.
@@ -255,8 +270,10 @@ def run_problem(
     first: Array | None = None
     run, begin = _integration(given, code), time.perf_counter()
     interpreted = code.library is None
+    # machine code runs no Python: the default handler of control-C raises between calls of `fill`
+    guard = control_c() if interpreted else nullcontext(_no_check)
     try:
-        with control_c() as check:
+        with guard as check:
             status = run.begin(x)
             if status <= _MORE and given.equations.passage is not None:
                 slope = np.empty(len(x))
@@ -281,7 +298,11 @@ def run_problem(
         stop = interrupted(run.time)
     if interpreted:
         code.spent += time.perf_counter() - begin
-    return replace(given.motion(table[: run.done], log, stop), first_slope=first)
+    return given.motion(table[: run.done], log, stop, first)
+
+
+def _no_check() -> None:
+    """Do nothing: the check for control-C if Python itself raises KeyboardInterrupt."""
 
 
 def _event(run: Any, given: IntegrationProblem) -> IntegrationEvent:
@@ -428,12 +449,14 @@ def integrate_events(
         Interrupted: control-C was pressed.
         CompilerError: the compiler that CC names does not start.
     """
-    key = (method, compiled and compiler_found())
     kept = {} if prepared is None else prepared
-    if key not in kept:
-        made = equations(rhs, project, method, events, passage)
-        kept[key] = IntegrationCode(made, may_compile=key[1])
-    code = kept[key]
+    code = kept.get((method, True)) if compiled else None
+    if code is None or code.library is None:  # compiled functions need no compiler
+        key = (method, compiled and compiler_found())
+        if key not in kept:
+            made = equations(rhs, project, method, events, passage)
+            kept[key] = IntegrationCode(made, may_compile=key[1])
+        code = kept[key]
     modes = () if events is None else events.modes
     given = problem(code.equations, x0, times, p, modes, (rtol, atol), max_step, stops, sizes)
     motion = run_problem(given, code, progress)

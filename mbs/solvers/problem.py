@@ -3,6 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal, get_args
 
 import casadi
 import numpy as np
@@ -130,12 +131,17 @@ def modes_at(times: Array, first: Array, events: tuple[IntegrationEvent, ...]) -
         first: (nm,) modes before the first event.
         events: events in order of time.
     """
+    if not first.size:
+        return np.empty((len(times), 0))
     values = np.array([first, *(event.modes for event in events)])
     passed = np.searchsorted([event.time for event in events], times, side="right")
     return values[passed]
 
 
-METHODS = ("dopri5", "rodas")
+Method = Literal["dopri5", "rodas"]
+"""Integration method: the explicit pair of Dormand and Prince, or RODAS5P for stiff systems."""
+
+METHODS: tuple[Method, ...] = get_args(Method)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -215,7 +221,11 @@ class IntegrationProblem:
     sizes: Array | None = None
 
     def motion(
-        self, x: Array, log: Sequence[IntegrationEvent], stop: SolverError | Interrupted | None
+        self,
+        x: Array,
+        log: Sequence[IntegrationEvent],
+        stop: SolverError | Interrupted | None,
+        first_slope: Array | None = None,
     ) -> EventMotion:
         """Return the result of an integration as an `EventMotion`.
 
@@ -223,9 +233,11 @@ class IntegrationProblem:
             x: (k, nx) states at the first k times.
             log: events in order of time.
             stop: error that ended the integration early; None if all times were reached.
+            first_slope: derivative of x at a singular start, see `EventMotion`.
         """
         first, events = self.p[len(self.p) - self.modes :], tuple(log)
-        return EventMotion(x, modes_at(self.times[: len(x)], first, events), events, stop)
+        modes = modes_at(self.times[: len(x)], first, events)
+        return EventMotion(x, modes, events, stop, first_slope)
 
 
 def equations(
@@ -423,21 +435,22 @@ def problem(
             f"integrate: {given}{f' and {len(m)} modes' if len(m) else ''} were given; "
             f"the right-hand side has {n} states and {n_p} parameters"
         )
-    if not all(np.isfinite(values).all() for values in (x, t, own, m)):
+    if not np.isfinite(np.concatenate([x, t, own, m])).all():
         raise ModelError("integrate: a state, a time or a parameter is not finite; give numbers")
-    if len(t) == 0 or np.any(np.diff(t) < 0):
+    if len(t) == 0 or (t[1:] < t[:-1]).any():
         raise ModelError("integrate: times must be one or more, in increasing order")
     rtol, atol = tolerances
     if not all(isinstance(value, (int, float)) and 0 < value < np.inf for value in tolerances):
         raise ModelError(f"integrate: tolerances {rtol!r} and {atol!r} must be positive numbers")
     if not (isinstance(max_step, (int, float)) and max_step > 0):
         raise ModelError(f"integrate: the longest step {max_step!r} must be a positive number, s")
-    ends = np.empty(0) if stops is None else numbers(stops[0])
-    jumps = np.ones(len(ends), bool) if stops is None else np.array(stops[1], dtype=bool).ravel()
-    if len(jumps) != len(ends) or not np.isfinite(ends).all() or np.any(np.diff(ends) <= 0):
-        raise ModelError(
-            "integrate: stops must be finite times in increasing order, and as many flags"
-        )
+    ends, jumps = np.empty(0), np.empty(0, dtype=bool)
+    if stops is not None:
+        ends, jumps = numbers(stops[0]), np.array(stops[1], dtype=bool).ravel()
+        if len(jumps) != len(ends) or not np.isfinite(ends).all() or np.any(np.diff(ends) <= 0):
+            raise ModelError(
+                "integrate: stops must be finite times in increasing order, and as many flags"
+            )
     every = np.concatenate([own, m])
     factors = None if sizes is None else np.ascontiguousarray(sizes, dtype=float)
     if factors is not None and (factors.shape != (2, n) or not np.all(factors > 0)):

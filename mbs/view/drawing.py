@@ -15,7 +15,7 @@ import numpy as np
 
 from mbs.assembly import System
 from mbs.view._scene import scene
-from mbs.view.mesh import BOX_CORNERS, BOX_FACES, rotation_onto
+from mbs.view.mesh import BOX_CORNERS, BOX_FACES
 from mbs.view.posed import Array, PosedLinks, plane_normal, pose_links
 from mbs.view.primitives import (
     AxisShape,
@@ -30,6 +30,7 @@ from mbs.view.primitives import (
     SpanShape,
     SpringShape,
     Vector,
+    rotation_onto,
 )
 
 Point = tuple[float, float]

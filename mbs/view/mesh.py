@@ -22,6 +22,7 @@ from mbs.view.primitives import (
     RingShape,
     SpanShape,
     SpringShape,
+    rotation_onto,
 )
 
 _SIDES = 14
@@ -113,17 +114,6 @@ def revolve(profile: Array, sides: int = _SIDES) -> Array:
     below, above = rings[:-1], rings[1:]
     faces = np.stack([below[:, :-1], below[:, 1:], above[:, 1:], above[:, :-1]], axis=2)
     return faces.reshape(-1, 4, 3)
-
-
-def rotation_onto(direction: Array) -> Array:
-    """Return a rotation matrix whose z axis has the given direction, or the identity for zero."""
-    length = float(np.linalg.norm(direction))
-    if length == 0:
-        return np.eye(3)
-    z = direction / length
-    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
-    x = x / np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
 
 
 def _round(item: BarShape | CylinderShape) -> Array:

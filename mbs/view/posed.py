@@ -15,7 +15,7 @@ from mbs.assembly.model_function import Named, model_function
 from mbs.assembly.tree import normalised
 from mbs.components.description import OUTER_WORLD
 from mbs.models.skeleton import Skeleton, skeleton
-from mbs.recursions.poses import base_poses, link_poses
+from mbs.recursions.link_motions import base_poses, link_poses
 from mbs.view.primitives import Rows, Vector
 
 Array = NDArray[np.float64]

@@ -206,3 +206,14 @@ def rgb(name: str, theme: Theme) -> NDArray[np.float64]:
         value = PALETTE[theme][first]
         text = value[int(number)] if isinstance(value, list) else str(value)
     return np.array([int(text[k : k + 2], 16) / 255 for k in (1, 3, 5)])
+
+
+def rotation_onto(direction: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a rotation matrix whose z axis has the given direction, or the identity for zero."""
+    length = float(np.linalg.norm(direction))
+    if length == 0:
+        return np.eye(3)
+    z = direction / length
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    x = x / np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])

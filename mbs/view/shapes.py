@@ -18,7 +18,7 @@ from mbs.errors import ModelError
 from mbs.expressions import Scalar, to_float
 from mbs.models.skeleton import SkeletonForce, SkeletonJoint, SkeletonLink, link_outline
 from mbs.text import shortened
-from mbs.view.mesh import revolve, rotation_onto
+from mbs.view.mesh import revolve
 from mbs.view.mesh_files import read_mesh
 from mbs.view.posed import SAME_POINT, Array, Measures, PosedLinks, rows, three
 from mbs.view.primitives import (
@@ -37,6 +37,7 @@ from mbs.view.primitives import (
     SpringShape,
     Vector,
     link_colour,
+    rotation_onto,
 )
 
 

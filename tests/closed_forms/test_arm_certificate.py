@@ -66,7 +66,7 @@ def test_every_complex_configuration_is_certified(kinds, count):
     found = certified_configurations(known, T)
     assert found.complete
     assert found.proof.endswith(f"certified: {count} of {count} roots")
-    assert len(found.q) == np.sum(roots.real) == len(general(known.general, T))
+    assert len(found.values) == np.sum(roots.real) == len(general(known.general, T))
 
 
 def _unit(arm):
@@ -114,9 +114,9 @@ def test_the_general_method_holds_where_many_roots_are_one():
     known = certified_arm(general_of(arm))
     for T in poses:
         found = certified_configurations(known, T)
-        assert (len(found.q), found.complete) == (2, True)
+        assert (len(found.values), found.complete) == (2, True)
         assert len(general(known.general, T)) == 2
-        assert np.max(arm.residual(found.q, T)) < 1e-12
+        assert np.max(arm.residual(found.values, T)) < 1e-12
 
 
 def test_what_is_no_root_is_not_certified():

@@ -21,10 +21,10 @@ def test_all_configurations_of_an_arm_with_a_wrist():
 
 def test_the_sixteen_configurations_of_manseur_and_doty():
     arm, T = manseur_doty()
-    found = counted_search(arm, T, starts=600)
-    assert found.q.shape == (16, 6)
-    assert np.min(found.hits) >= 5
-    off_diagonal = apart(arm, found.q, found.q) + 10 * np.eye(16)
+    found, hits = counted_search(arm, T, starts=600)
+    assert found.shape == (16, 6)
+    assert np.min(hits) >= 5
+    off_diagonal = apart(arm, found, found) + 10 * np.eye(16)
     assert np.min(off_diagonal) > 1e-2
 
 

@@ -42,9 +42,9 @@ def test_every_pose_is_found_and_certified(kind, seed):
     found = poses(a, b, length)
     assert found.complete
     assert found.proof == f"homotopy, certified: {DEGREES[kind]} of {DEGREES[kind]} paths"
-    assert min(distance(e, p, *other) for other in zip(found.e, found.p, strict=True)) < 1e-9
-    for own, place in zip(found.e, found.p, strict=True):
-        np.testing.assert_allclose(lengths_at(a, b, own, place), length, rtol=1e-12)
+    assert min(distance(e, p, x[3:], x[:3]) for x in found.values) < 1e-9
+    for x in found.values:
+        np.testing.assert_allclose(lengths_at(a, b, x[3:], x[:3]), length, rtol=1e-12)
     assert missed(found, searched(a, b, length, 60, seed)) == 0
 
 
@@ -68,7 +68,7 @@ def test_forty_real_poses():
     ]
     length = [1, 0.645275, 1.086284, 1.503439, 1.281933, 0.771071]
     found = poses(np.array(a), np.array(b), np.array(length))
-    assert (len(found.e), found.complete) == (40, True)
+    assert (len(found.values), found.complete) == (40, True)
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
@@ -77,10 +77,9 @@ def test_the_unit_of_length_does_not_matter(scale):
     a, b = ends("6-6", rng)
     length = lengths_at(a, b, *random_pose(rng))
     small, large = poses(a, b, length), poses(scale * a, scale * b, scale * length)
-    assert len(small.e) == len(large.e) >= 2
-    for e, p in zip(small.e, small.p, strict=True):
-        others = zip(large.e, large.p / scale, strict=True)
-        assert min(distance(e, p, *other) for other in others) < 1e-6
+    assert len(small.values) == len(large.values) >= 2
+    for x in small.values:
+        assert min(distance(x[3:], x[:3], y[3:], y[:3] / scale) for y in large.values) < 1e-6
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -104,7 +103,7 @@ def test_a_fold_is_kept_and_counted(seed):
     found = poses(a, b, length)
     assert found.proof == "homotopy, certified: 38 of 40 paths, and 2 where poses meet"
     assert found.complete
-    assert min(distance(e, p, *other) for other in zip(found.e, found.p, strict=True)) < 1e-5
+    assert min(distance(e, p, x[3:], x[:3]) for x in found.values) < 1e-5
 
 
 def _pitch(lines, mix):
@@ -127,7 +126,7 @@ def test_a_platform_that_moves_is_not_said_to_be_complete():
     found = poses(a, a, np.full(6, 1.3))
     assert not found.complete
     assert found.proof.startswith("homotopy, certified: 0 of 24 paths")
-    assert len(found.e) > 0
+    assert len(found.values) > 0
     assert poses(a, a, np.array([1.3] * 5 + [1.3001])).complete
 
 

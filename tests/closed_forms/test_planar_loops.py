@@ -40,15 +40,15 @@ def test_triads(kinds, seed):
 def test_three_loops(seed):
     loops = closed_loops(np.random.default_rng(seed), 3)
     roots = planar_roots(loops)
-    assert roots.methods == ("Dixon's determinant of degree 20",)
+    assert roots.proof == "Dixon's determinant of degree 20"
     assert missed(loops, roots, searched(loops, 1000, seed)) == 0
 
 
 def test_four_loops():
     loops = closed_loops(np.random.default_rng(1), 4)
     roots = planar_roots(loops)
-    assert roots.methods == ("Dixon's determinant of degree 70",)
-    assert len(roots.theta) == 10
+    assert roots.proof == "Dixon's determinant of degree 70"
+    assert len(roots.values) == 10
     assert missed(loops, roots, searched(loops, 600, 1)) == 0
 
 
@@ -58,7 +58,7 @@ def test_sparse_loops_are_split(seed):
     rng = np.random.default_rng(seed)
     loops = closed_loops(rng, 3, zeros=[(0, 4), (0, 5), (1, 4), (1, 5), (2, 0), (2, 2), (2, 3)])
     roots = planar_roots(loops)
-    assert roots.methods == ("Dixon's determinant of degree 6", "the quadratic equation of a dyad")
+    assert roots.proof == "Dixon's determinant of degree 6 and the quadratic equation of a dyad"
     assert missed(loops, roots, searched(loops, 600, seed)) == 0
 
 
@@ -67,7 +67,7 @@ def test_sparse_loops_that_do_not_split(seed):
     rng = np.random.default_rng(seed)
     loops = closed_loops(rng, 3, zeros=[(0, 3), (0, 5), (1, 1), (1, 4), (2, 0), (2, 2)])
     roots = planar_roots(loops)
-    assert len(roots.methods) == 1
+    assert " and " not in roots.proof
     assert missed(loops, roots, searched(loops, 1000, seed)) == 0
 
 
@@ -83,7 +83,7 @@ def test_rows_that_contradict_each_other_have_no_roots():
     mix = np.array([[1.0, 0], [0, 1], [1, 1]])
     constant = mix @ loops.constant + np.array([0, 0, 0.1])
     more = PlanarLoops(mix @ loops.angles, mix @ loops.slides, loops.carriers, constant)
-    assert len(planar_roots(more).theta) == 0
+    assert len(planar_roots(more).values) == 0
 
 
 @pytest.mark.parametrize("seed", range(200 if EVERY_CASE else 20))
@@ -91,7 +91,7 @@ def test_a_fold_is_kept(seed):
     """Legs in line with the normals of the curve of the platform: two roots meet."""
     folded, theta = folded_triad(np.random.default_rng(seed))
     roots = planar_roots(folded)
-    gap = np.abs(np.exp(1j * roots.theta) - np.exp(1j * theta)).max(axis=1)
+    gap = np.abs(np.exp(1j * roots.values) - np.exp(1j * theta)).max(axis=1)
     assert gap.min() < 1e-5
 
 
@@ -138,7 +138,7 @@ def test_loops_with_slides(kind):
         loops = closed(rng, angles, complex_numbers(rng, count, len(carriers)), carriers)
         roots = planar_roots(loops)
         assert roots.complete
-        assert roots.methods == (f"homotopy, certified: {degree} of {degree} paths",)
+        assert roots.proof == f"homotopy, certified: {degree} of {degree} paths"
         assert missed(loops, roots, searched(loops, 300, 1)) == 0
 
 
@@ -146,8 +146,8 @@ def test_loops_with_slides(kind):
 def test_paths_and_the_determinant_agree(seed):
     loops = closed_loops(np.random.default_rng(seed), 2)
     found, paths = planar_roots(loops), path_roots(loops)
-    assert (len(paths.theta), paths.complete) == (len(found.theta), True)
-    assert missed(loops, paths, np.concatenate([found.theta, found.s], axis=1)) == 0
+    assert (len(paths.values), paths.complete) == (len(found.values), True)
+    assert missed(loops, paths, found.values) == 0
 
 
 def test_paths_that_meet_count_twice():
@@ -167,10 +167,11 @@ def test_a_row_too_many(count, slides):
     angles = complex_numbers(rng, count, 2 * count - 1 - slides)
     loops = closed(rng, angles, complex_numbers(rng, count, slides), [KNOWN] * slides)
     roots = planar_roots(loops)
-    assert (len(roots.theta), roots.complete) == (1, True)
-    assert np.abs(loops.rows(roots.theta, roots.s)[0]).max() < 1e-14
+    n, _ = loops.counts
+    assert (len(roots.values), roots.complete) == (1, True)
+    assert np.abs(loops.rows(*np.split(roots.values, [n], axis=1))[0]).max() < 1e-14
     other = PlanarLoops(loops.angles, loops.slides, loops.carriers, loops.constant + 1e-3)
-    assert len(planar_roots(other).theta) == 0
+    assert len(planar_roots(other).values) == 0
 
 
 def test_what_is_not_known_is_said():

@@ -11,7 +11,7 @@ from support.parts import asked, run, stored
 
 import mbs
 from mbs.components import Body, Cam, PointMass, PointOnCurve, Prismatic, Revolute, Spherical
-from mbs.components.splines import natural_spline, periodic_spline
+from mbs.components.curves import natural_spline, periodic_spline
 from mbs.errors import DescriptionError
 
 G = 9.81

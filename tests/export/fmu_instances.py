@@ -1,6 +1,7 @@
 """Unpacked FMUs and what tests do with their instances."""
 
 import ctypes
+import math
 import struct
 import zlib
 
@@ -12,8 +13,6 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 from fmpy.logging import addLoggerProxy
-
-from mbs.simulate.fmu_variables import reader
 
 SOLVERS = pytest.mark.parametrize("solver", ["dopri5", "rodas", "rk4"])
 TIGHT = 1e-11
@@ -35,8 +34,15 @@ def _kept_callbacks():
 
 def values(instance, description, names):
     """Values of variables of any type, in the order of the names."""
-    variables = {v.name: v for v in description.modelVariables}
-    return np.array(reader(instance, [variables[name] for name in names])())
+    variables, found = {v.name: v for v in description.modelVariables}, []
+    for variable in (variables[name] for name in names):
+        get = getattr(instance, f"get{variable.type}")
+        if description.fmiVersion == "2.0":
+            found += get([variable.valueReference])
+        else:
+            size = math.prod(variable.shape or ())
+            found += get([variable.valueReference], nValues=size)
+    return np.array(found, dtype=float)
 
 
 class Fmu:

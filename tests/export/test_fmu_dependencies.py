@@ -7,9 +7,9 @@ from fmu_models import pendulum, slider_crank
 from fmu_structures import ball, two_cranks
 from support.catalogue_systems import catalogue_system
 
+from mbs.export.fmu.dependencies import dependencies, linearity, structure
 from mbs.export.fmu.options import FmuOptions
 from mbs.export.fmu.system_fmu import fmu_model
-from mbs.export.fmu.xml import dependencies, linearity, structure
 
 SEED = 20261122
 

@@ -15,16 +15,15 @@ from fmu_structures import ball, two_cranks
 import mbs
 from mbs.components import Body, Revolute, RigidStop
 from mbs.errors import ExportError
-from mbs.export.fmu import fmi2_xml, fmi3_xml
 from mbs.export.fmu.description import FmuModel, FmuVariable, Member, Terminal
 from mbs.export.fmu.system_fmu import fmu_model
-from mbs.export.fmu.xml import terminals_and_icons
+from mbs.export.fmu.xml import model_description, terminals_and_icons
 
 
 def texts(model):
     return {
-        "2": fmi2_xml.model_description(model, "{guid}", ["model.c"]),
-        "3": fmi3_xml.model_description(model, "{guid}"),
+        "2": model_description(model, "2.0", "{guid}", ["model.c"]),
+        "3": model_description(model, "3.0", "{guid}"),
     }
 
 

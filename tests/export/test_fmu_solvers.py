@@ -10,9 +10,9 @@ import pytest
 from fmu_models import pendulum, slider_crank
 
 from mbs.errors import ExportError
-from mbs.export.fmu import fmi2_xml, fmi3_xml
 from mbs.export.fmu.description import FmuModel, FmuState, FmuVariable
 from mbs.export.fmu.pack import write_fmu
+from mbs.export.fmu.xml import model_description
 
 MODELS = {"pendulum": pendulum, "slider_crank": slider_crank}
 
@@ -81,7 +81,7 @@ def test_a_solver_that_is_not_there():
 def test_the_fixed_step_is_stated_where_there_is_one(solver):
     """In FMI 3.0; the schema of 2.0 has no attribute for it."""
     model = dataclasses.replace(pendulum(), solver=solver, internal_step=0.002)
-    root = ET.fromstring(fmi3_xml.model_description(model, "{token}"))
+    root = ET.fromstring(model_description(model, "3.0", "{token}"))
     stated = root.find("CoSimulation").get("fixedInternalStepSize")
     assert stated == ("0.002" if solver == "rk4" else None)
-    assert "fixedInternalStepSize" not in fmi2_xml.model_description(model, "{guid}", [])
+    assert "fixedInternalStepSize" not in model_description(model, "2.0", "{guid}")

@@ -16,10 +16,10 @@ import mbs
 import mbs.models
 from mbs import Mechanism
 from mbs.components import Body, Revolute
+from mbs.components.component import component_name
 from mbs.errors import ModelError
 from mbs.export.languages import LANGUAGES
 from mbs.formats import FrameRow, InertiaRow, RobotTable, read_par, write_par, write_toml
-from mbs.formats.files import component_name
 from mbs.native import find_compiler
 
 EVIL = "EVIL_CODE"

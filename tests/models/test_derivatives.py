@@ -15,9 +15,8 @@ from mbs.errors import ModelError
 from mbs.models import inverse_dynamics_derivatives
 from mbs.operations import count
 from mbs.recursions import newton_euler_derivatives as recursion
+from mbs.recursions.link_motions import link_poses, moving_base, resting_base
 from mbs.recursions.newton_euler import newton_euler
-from mbs.recursions.poses import link_poses
-from mbs.recursions.velocities import moving_base, resting_base
 
 TREES = [
     *((seed, False, False) for seed in range(4)),

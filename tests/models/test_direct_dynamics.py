@@ -27,7 +27,7 @@ from mbs.components import (
 from mbs.errors import ModelError
 from mbs.operations import count
 from mbs.recursions.articulated_body import solve_inertia
-from mbs.recursions.poses import link_poses
+from mbs.recursions.link_motions import link_poses
 
 ROBOTS = ("puma560", "stanford", "rx90", "scara", "planar_2r", "cart_pole", "two_branch_tree")
 TREES = [

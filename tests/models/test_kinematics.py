@@ -17,7 +17,7 @@ import mbs.models
 from mbs.components import Free, Prismatic, Revolute, Spherical
 from mbs.errors import ModelError
 from mbs.models import jacobian, jacobian_dot_velocity, link_accelerations, link_velocities
-from mbs.recursions.poses import base_poses, link_poses
+from mbs.recursions.link_motions import base_poses, link_poses
 
 COMMON = dict(deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 

@@ -1,7 +1,11 @@
 import importlib.util
+import os
 import platform
 import shlex
+import signal
 import subprocess
+import threading
+import time
 
 import pytest
 
@@ -53,6 +57,29 @@ def test_refused_code_names_the_error(tmp_path):
     source.write_text("int f(void) { return nothing; }")
     with pytest.raises(CompilerError, match=r"refused bad\.c: .*nothing"):
         compile_library([source], output=tmp_path / "bad.so")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the script is one of a POSIX shell")
+def test_control_c_ends_the_compiler(tmp_path, monkeypatch):
+    script, number = tmp_path / "slow", tmp_path / "number"
+    script.write_text(
+        f'#!/bin/sh\ncase "$1" in --version) exit;; esac\necho $$ > {number}\nexec sleep 60'
+    )
+    script.chmod(0o700)
+    monkeypatch.setenv("CC", str(script))
+    source = tmp_path / "a.c"
+    source.write_text("int a;")
+
+    def press():
+        while not (number.exists() and number.read_text().strip()):
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Thread(target=press, daemon=True).start()
+    with pytest.raises(KeyboardInterrupt):
+        compile_library([source], output=tmp_path / "a.so")
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(number.read_text()), 0)
 
 
 def test_a_refused_link_names_the_missing_function(tmp_path):

@@ -7,7 +7,7 @@ from operations.expressions import function, require_equal
 import mbs
 from mbs.errors import ModelError
 from mbs.operations import PASSES, Pass, count, pipeline, simplification, simplify
-from mbs.operations.verification import witness
+from mbs.operations.pipeline import witness
 
 
 def _rotations(q, x):

@@ -6,7 +6,7 @@ import pytest
 from casadi import SX
 
 import mbs
-from mbs.recursions.poses import link_poses
+from mbs.recursions.link_motions import link_poses
 
 
 def test_height_is_the_distance_from_the_seat_along_the_axis():

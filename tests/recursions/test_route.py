@@ -7,7 +7,7 @@ from casadi import SX
 from support.random_trees import ALL_KINDS, random_state, random_tree
 from symbolic_robots import symbolic_robot
 
-from mbs.recursions.poses import base_poses, link_poses
+from mbs.recursions.link_motions import base_poses, link_poses
 from mbs.recursions.route import (
     OtherRotation,
     PathTranslation,

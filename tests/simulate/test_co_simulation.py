@@ -8,9 +8,9 @@ from fmpy.fmi1 import FMICallException
 from fmpy.model_description import CoSimulation, ModelDescription, ModelVariable
 
 from mbs.errors import SolverError
-from mbs.simulate._fmu import Intermediate, co_simulate
-from mbs.simulate.fmu_plan import Plan, recording_of, row_times, tracks_of, with_points
-from mbs.simulate.fmu_variables import columns_of, reader, writer
+from mbs.simulate._fmu import Intermediate, simulate
+from mbs.simulate.fmu_plan import Plan, recording_of, row_times, with_points
+from mbs.simulate.fmu_variables import columns_of, elements_of, reader, tracks_of, writer
 
 
 def variable(name, kind, reference, **others):
@@ -26,9 +26,7 @@ class Values:
 
     def __getattr__(self, name):
         if name[:3] == "get":
-            return lambda references, nValues=None: [
-                x for r in references for x in np.ravel(self.values[r])
-            ]
+            return lambda vr, nValues=None: [x for r in vr for x in np.ravel(self.values[r])]
         if name[:3] == "set" and name != "setupExperiment":
             return lambda references, values: self.values.update(
                 zip(references, values, strict=True)
@@ -51,8 +49,9 @@ def test_numbers_of_every_type_are_read_and_written():
         **{"x": "m", "on": "1", "M[1,1]": "1", "M[1,2]": "1", "M[2,1]": "1", "M[2,2]": "1"},
         **{"n": "1", "choice": "1", "v[1]": "rad", "v[2]": "rad", "v[3]": "rad"},
     }
-    assert reader(unit, variables)() == [0.5, 1, 0, 1, 2, 3, 7, 2, 8, 9, 10]
-    scalars = [v for v in variables if not v.shape]
+    description = SimpleNamespace(fmiVersion="3.0", modelVariables=variables)
+    assert reader(unit, description, variables)() == [0.5, 1, 0, 1, 2, 3, 7, 2, 8, 9, 10]
+    scalars = [e for v in variables if not v.shape for e in elements_of(v)]
     writer(unit, scalars)([1.5, 0.0, 3.0, 1.0])
     assert [unit.values[k] for k in (1, 2, 4, 5)] == [1.5, False, 3, 1]
     assert isinstance(unit.values[2], bool)
@@ -122,7 +121,7 @@ def played(unit, description, duration, step, inputs):
         rows="step",
     )
     recording = recording_of(unit, description, description.modelVariables, lambda time: None)
-    co_simulate(unit, plan, recording, Intermediate())
+    simulate(unit, plan, recording, Intermediate())
     return recording.result()
 
 

@@ -339,12 +339,12 @@ REFUSED = {
     "friction alone": (
         (lambda m, knot, body: CoulombFriction("g", joint="n", sliding=1.0),),
         {"friction": 0, "viscous": 0},
-        "CoulombFriction g, which needs viscous damping of the node alone",
+        "CoulombFriction g, which needs viscous damping of the node alone.*SpringFrictionSeries",
     ),
     "sticking": (
         (lambda m, knot, body: CoulombFriction("g", joint="n", sliding=1.0, sticking=2.0),),
         {"friction": 0},
-        "CoulombFriction g, which needs .* sticking = sliding",
+        "CoulombFriction g, which needs sticking = sliding.*or give the node a mass",
     ),
     "a damper to a mass": (
         (lambda m, knot, body: Damper("d", knot, body, damping=3.0),),
@@ -360,7 +360,7 @@ REFUSED = {
     "a stop": (
         (lambda m, knot, body: RigidStop("r", joint="n", lower=-1.0),),
         {"friction": 0},
-        "RigidStop r, which locks and releases",
+        "RigidStop r, which locks and releases a mass only: give the node a mass",
     ),
     "an input": (
         (lambda m, knot, body: ForceInput("push", knot.at()),),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import mbs
-from mbs.assembly.degrees import like_degrees
+from mbs.assembly.variable_names import like_degrees
 from mbs.components import PointMass, Prismatic, Revolute
 from mbs.errors import Unclosable
 

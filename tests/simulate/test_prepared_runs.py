@@ -1,9 +1,11 @@
 """What a second run of a system takes from the first one, and what it must not."""
 
+import cProfile
 import importlib
 import os
 import subprocess
 import sys
+import time
 
 import casadi
 import numpy as np
@@ -341,3 +343,21 @@ def test_callbacks_of_one_name_are_told_apart():
     expected = [swing(system, tau={"q1": law.strength})["q1.q"][-1] for law in laws]
     np.testing.assert_allclose(ends, expected, 1e-6)
     assert abs(ends[0] - ends[1]) > 0.01
+
+
+def test_a_short_compiled_run_costs_few_function_calls():
+    # 402 calls; counts do not depend on the load of the computer, unlike times
+    simulator = mbs.simulate.Simulator(mbs.load("puma560").assemble())
+    begin = time.monotonic()
+    while not compiled(simulator) and time.monotonic() < begin + 60:
+        simulator(0.1)
+    if not compiled(simulator):
+        pytest.skip("no C compiler")
+    profile = cProfile.Profile()
+    profile.runcall(simulator, 0.1)
+    assert sum(row.callcount for row in profile.getstats()) < 480
+
+
+def compiled(simulator):
+    codes = simulator._equations(simulator.system).prepared.values()
+    return any(getattr(code, "library", None) is not None for code in codes)

@@ -224,7 +224,8 @@ def test_an_fmu_that_stops_hands_over_its_rows(system, tmp_path, kind):
     rows_are_kept(caught.value)
 
 
-def test_control_c_in_the_co_simulation_of_an_fmu(system, tmp_path):
+@pytest.mark.parametrize("kind", ["CoSimulation", "ModelExchange"])
+def test_control_c_in_the_simulation_of_an_fmu(system, tmp_path, kind):
     path = mbs.export.fmu(system, tmp_path / "cart.fmu")
 
     def effort(t):
@@ -233,7 +234,7 @@ def test_control_c_in_the_co_simulation_of_an_fmu(system, tmp_path):
         return 1.0
 
     with pytest.raises(Interrupted) as caught:
-        mbs.simulate.fmu(path, inputs={"x.tau": effort}, step=0.1, quiet=True)
+        mbs.simulate.fmu(path, inputs={"x.tau": effort}, step=0.1, kind=kind, quiet=True)
     rows_are_kept(caught.value)
 
 

@@ -118,5 +118,5 @@ def distance(e, p, other_e, other_p):
 
 def missed(poses, found):
     """How many of the poses that a search found are not there."""
-    own = list(zip(poses.e, poses.p, strict=True))
+    own = [(x[3:], x[:3]) for x in poses.values]
     return sum(all(distance(*pose, *other) > 1e-3 for other in own) for pose in found)

@@ -87,5 +87,4 @@ def distance(loops, x, other):
 
 def missed(loops, roots, found):
     """How many of the roots that a search found are not there."""
-    every = np.concatenate([roots.theta, roots.s], axis=1)
-    return sum(all(distance(loops, x, own) > 1e-4 for own in every) for x in found)
+    return sum(all(distance(loops, x, own) > 1e-4 for own in roots.values) for x in found)

@@ -21,6 +21,7 @@ from mbs.app.cli import (
     web,
 )
 from mbs.app.cli.arguments import examples, help_of
+from mbs.app.cli.derived import add_derived
 from mbs.app.cli.group import Commands
 from mbs.version import __version__
 
@@ -61,6 +62,14 @@ def _start(
     """
 
 
+_OPTIONS = {
+    "simulate": simulate.motion_options,
+    "sweep": simulate.motion_options,
+    "solve-ik": solve_ik.pose_options,
+    "identify": identify.identify_options,
+}
+"""Functions that return the dataclass from which options of a command are derived."""
+
 application.callback(help=help_of(_start))(_start)
 for _name, _command, _examples in (
     ("robots", robots.robots, robots.EXAMPLES),
@@ -74,6 +83,9 @@ for _name, _command, _examples in (
     ("identify", identify.identify, identify.EXAMPLES),
     ("convert", convert.convert, convert.EXAMPLES),
 ):
-    application.command(_name, help=help_of(_command), epilog=_examples)(_command)
+    if _name in _OPTIONS:
+        add_derived(application, _name, _command, _OPTIONS[_name], _examples)
+    else:
+        application.command(_name, help=help_of(_command), epilog=_examples)(_command)
 application.add_typer(export.commands, name="export")
 application.command("app", help=help_of(web.app), epilog=web.EXAMPLES)(web.app)

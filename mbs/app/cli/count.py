@@ -65,7 +65,7 @@ def count(
     parameters alone are counted separately.
     """
     from mbs.app.tasks.equations import EVERY_PASS, counts
-    from mbs.app.tasks.simulation import assignments
+    from mbs.app.tasks.laws import assignments
 
     assembled = system(robot, parameter, gravity, mount)
     options = assignments(option or (), "--option")

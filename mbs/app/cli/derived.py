@@ -17,6 +17,8 @@ from mbs.options import OptionInfo, ValueKind, default_text, option_fields, valu
 
 _METAVARS = {"s": "SECONDS"}
 """Words for the value of a number by its unit. Other numbers are NUMBER."""
+_LONGEST = 40
+"""Longest list of choices in the column of values [characters]: half of a terminal."""
 
 
 def add_derived(
@@ -118,7 +120,7 @@ def _parameters(
         if option.command:
             kind = "flag" if _flag(option) else kinds[name]
             type_, default, about = _TYPED[kind](field, option)
-            shown = typer.Option(option.command, help=_help(option, kind), **about)
+            shown = typer.Option(_names(field, option), help=_help(option, kind), **about)
             yield inspect.Parameter(
                 name,
                 inspect.Parameter.KEYWORD_ONLY,
@@ -128,7 +130,7 @@ def _parameters(
 
 
 _TYPED: dict[ValueKind, Callable[[Field[Any], OptionInfo], tuple[Any, Any, dict[str, Any]]]] = {
-    "flag": lambda field, option: (bool, False, {}),
+    "flag": lambda field, option: (bool, field.default is True, {}),
     "number": lambda field, option: (
         str,
         default_text(field),
@@ -142,10 +144,27 @@ _TYPED: dict[ValueKind, Callable[[Field[Any], OptionInfo], tuple[Any, Any, dict[
         None,
         {"metavar": "NAME", "show_default": False},
     ),
-    "choice": lambda field, option: (str, field.default, {"metavar": "|".join(option.choices)}),
-    "text": lambda field, option: (str, field.default, {"metavar": "TEXT"}),
+    "choice": lambda field, option: (str, field.default, {"metavar": _choices(field, option)}),
+    "text": lambda field, option: (
+        str,
+        field.default,
+        {"metavar": "TEXT", "show_default": bool(field.default)},
+    ),
 }
 """Type, default and appearance of an option of the command line, by the kind of its values."""
+
+
+def _choices(field: Field[Any], option: OptionInfo) -> str:
+    """Return all choices, or a word if they are too long for the column of the help page."""
+    every = "|".join(option.choices)
+    return every if len(every) <= _LONGEST else field.name.upper()
+
+
+def _names(field: Field[Any], option: OptionInfo) -> str:
+    """Return the name of an option, and the name that turns off what is on by default."""
+    if field.default is True:
+        return f"{option.command}/{option.command.replace('--', '--no-', 1)}"
+    return option.command
 
 
 def _flag(option: OptionInfo) -> str:

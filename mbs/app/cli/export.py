@@ -18,6 +18,7 @@ from mbs.app.cli.printing import note
 C_EXAMPLES = examples(
     "mbs export c puma560 build/puma560",
     "mbs export c sr400 sr400.zip --model idm --model ddm",
+    "mbs export c scara build/scara --bare --float",
 )
 FMU_EXAMPLES = examples(
     "mbs export fmu four_bar four_bar.fmu",
@@ -72,23 +73,30 @@ Model = Annotated[
 
 def export_c(
     robot: Robot,
-    target: Place,
+    path: Place,
     *,
     model: Model = None,
+    options: dict[str, Any],
     parameter: Parameters = None,
     gravity: Gravity = "",
     mount: Mount = None,
 ) -> None:
     """Export models as C source with a header, CMakeLists.txt and an example."""
     from mbs.app.tasks import exporting
-    from mbs.export import c_library
 
     assembled, keys = system(robot, parameter, gravity, mount), model or exporting.MODELS
-    if target.suffix.lower() == ".zip":
-        _write(target, exporting.c_library(assembled, keys))
+    if path.suffix.lower() == ".zip":
+        _write(path, exporting.c_library(assembled, keys, library=options))
         return
-    c_library(exporting.c_functions(assembled, keys), target)
-    note(f"wrote {target}")
+    exporting.write_c_library(assembled, path, keys, library=options)
+    note(f"wrote {path}")
+
+
+def _c_options() -> type:
+    """Return the dataclass of the options of a C library."""
+    from mbs.export.c_options import CLibraryOptions
+
+    return CLibraryOptions
 
 
 def export_fmu(
@@ -177,8 +185,8 @@ def _write(target: Path, content: bytes) -> None:
 
 
 add_derived(commands, "fmu", export_fmu, _fmu_options, FMU_EXAMPLES)
+add_derived(commands, "c", export_c, _c_options, C_EXAMPLES)
 for _name, _command, _examples in (
-    ("c", export_c, C_EXAMPLES),
     ("par", export_par, PAR_EXAMPLES),
     ("toml", export_toml, TOML_EXAMPLES),
     ("html", export_html, HTML_EXAMPLES),

@@ -44,22 +44,8 @@ Bandwidth = Annotated[
         help="Of the filters: five to ten times the highest frequency of the motion.",
     ),
 ]
-Method = Annotated[
-    str,
-    typer.Option(
-        metavar="METHOD",
-        help="least_squares, weighted, reweighted, robust, instrumental or consistent.",
-    ),
-]
-Equations = Annotated[str, typer.Option(metavar="EQUATIONS", help="dynamic, filtered or energy.")]
 Velocities = Annotated[
     str, typer.Option(metavar="SOURCE", help="differences of positions, or measured.")
-]
-Rotors = Annotated[
-    bool, typer.Option("--rotors/--no-rotors", help="Whether to look for inertias of rotors.")
-]
-Offsets = Annotated[
-    bool, typer.Option("--offsets", help="Look for a constant effort of each joint too.")
 ]
 Residuals = Annotated[
     Path | None,
@@ -76,11 +62,8 @@ def identify(
     record: Record,
     *,
     bandwidth: Bandwidth = "10",
-    method: Method = "weighted",
-    equations: Equations = "dynamic",
     velocities: Velocities = "differences",
-    rotors: Rotors = True,
-    offsets: Offsets = False,
+    options: dict[str, Any],
     residuals: Residuals = None,
     parameter: Parameters = None,
     gravity: Gravity = "",
@@ -98,14 +81,7 @@ def identify(
     from mbs.files import write_text
 
     require_places(output, residuals)
-    settings = task.IdentificationSettings(
-        bandwidth=bandwidth,
-        method=method,
-        equations=equations,
-        velocities=velocities,
-        rotors=rotors,
-        offsets=offsets,
-    )
+    settings = task.IdentificationSettings(bandwidth, velocities, options)
     content = _content(record, LARGEST)
     found = task.identify(system(robot, parameter, gravity, mount), content, settings)
     for path, text in ((output, found.csv), (residuals, found.residuals_csv)):
@@ -116,6 +92,13 @@ def identify(
         print_json(_data(found))
     else:
         typer.echo(found.text)
+
+
+def identify_options() -> type:
+    """Return the dataclass of the options of an identification."""
+    from mbs.identification.options import IdentifyArguments
+
+    return IdentifyArguments
 
 
 def _content(path: Path, most: int) -> bytes:

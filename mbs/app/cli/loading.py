@@ -75,7 +75,7 @@ def numbers(texts: Sequence[str] | None, option: str) -> dict[str, float]:
     Raises:
         DescriptionError: a text is not an assignment of a number.
     """
-    from mbs.app.tasks.simulation import assignments
+    from mbs.app.tasks.laws import assignments
     from mbs.expressions import number
 
     given = assignments(texts or (), option)

@@ -115,7 +115,7 @@ def equations_of(
         MbsError: the model, an option or the language is unknown, or the robot lacks the model.
     """
     from mbs.app.tasks import equations as task
-    from mbs.app.tasks.simulation import assignments
+    from mbs.app.tasks.laws import assignments
 
     texts = assignments(options or (), "--option")
     values = task.parsed_options(assembled, task.entry(key), texts)

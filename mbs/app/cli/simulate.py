@@ -31,7 +31,6 @@ Names = list[str] | None
 Duration = Annotated[
     str, typer.Option("--duration", "-t", metavar="SECONDS", help="Simulated time.")
 ]
-Step = Annotated[str, typer.Option(metavar="SECONDS", help="Time between rows of the result.")]
 Q0 = Annotated[
     Names,
     typer.Option(
@@ -71,19 +70,6 @@ Motion = Annotated[
         show_default=False,
     ),
 ]
-Tolerance = Annotated[
-    str, typer.Option(metavar="NUMBER", help="What the error of the motion should stay near.")
-]
-MaxStep = Annotated[
-    str,
-    typer.Option(
-        metavar="SECONDS",
-        help="The longest step of the integration; errors and laws alone limit it by default.",
-        show_default=False,
-    ),
-]
-Method = Annotated[str, typer.Option(metavar="METHOD", help="dopri5, or rodas for stiff systems.")]
-
 
 Output = Annotated[Path | None, output("CSV file to write, - for the standard output.")]
 Plot = Annotated[
@@ -112,15 +98,12 @@ def simulate(
     robot: Robot,
     *,
     duration: Duration = "2",
-    step: Step = "0.01",
+    options: dict[str, Any],
     q0: Q0 = None,
     v0: V0 = None,
     tau: Tau = None,
     input_: Input = None,
     motion: Motion = None,
-    tolerance: Tolerance = "1e-8",
-    method: Method = "dopri5",
-    max_step: MaxStep = "",
     parameter: Parameters = None,
     gravity: Gravity = "",
     mount: Mount = None,
@@ -142,14 +125,7 @@ def simulate(
     require_places(file, plot, film)
     laws = assigned(q0=q0, v0=v0, tau=tau, input=input_, motion=motion)
     assembled = system(robot, parameter, gravity, mount)
-    settings = task.SimulationSettings(
-        duration=duration,
-        step=step,
-        tolerance=tolerance,
-        method=method,
-        max_step=max_step,
-        **laws,
-    )
+    settings = task.SimulationSettings(duration=duration, options=options, **laws)
     stop = None
     try:
         result = task.simulate(assembled, settings)
@@ -169,6 +145,13 @@ def simulate(
         raise stop
 
 
+def motion_options() -> type:
+    """Return the dataclass of the options of a motion."""
+    from mbs.simulate.options import MotionOptions
+
+    return MotionOptions
+
+
 def assigned(**texts: Sequence[str] | None) -> dict[str, Any]:
     """Return the fields of `SimulationSettings` from the texts of options.
 
@@ -178,7 +161,7 @@ def assigned(**texts: Sequence[str] | None) -> dict[str, Any]:
     Raises:
         DescriptionError: a text is not NAME=VALUE.
     """
-    from mbs.app.tasks.simulation import assignments
+    from mbs.app.tasks.laws import assignments
 
     fields = {"input": "inputs"}
     return {

@@ -64,9 +64,6 @@ Frame = Annotated[
         show_default=False,
     ),
 ]
-Method = Annotated[
-    str, typer.Option(metavar="METHOD", help="auto, pieper, paul, general or search.")
-]
 Seed = Annotated[
     list[str] | None,
     typer.Option(
@@ -101,7 +98,7 @@ def solve_ik(
     rpy: Rpy = None,
     q: Q = None,
     frame: Frame = None,
-    method: Method = "auto",
+    options: dict[str, Any],
     seed: Seed = None,
     locked: Locked = None,
     redundant: Redundant = None,
@@ -122,7 +119,7 @@ def solve_ik(
         assembled,
         wanted,
         place,
-        method,
+        **options,
         seed=numbers(seed, "--seed") or None,
         locked=numbers(locked, "--locked") or None,
         redundant=_counts(redundant),
@@ -134,6 +131,13 @@ def solve_ik(
     if not found.rows:
         note(f"mbs: {_reason(found)}")
         raise typer.Exit(1)
+
+
+def pose_options() -> type:
+    """Return the dataclass of the options of the inverse geometric model."""
+    from mbs.models.inverse_geometry.options import PoseOptions
+
+    return PoseOptions
 
 
 def _counts(texts: list[str] | None) -> dict[str, int] | None:

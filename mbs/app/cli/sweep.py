@@ -11,7 +11,7 @@ from mbs.app.cli.arguments import Gravity, Json, Mount, Output, Parameters, Robo
 from mbs.app.cli.loading import system
 from mbs.app.cli.places import require_places
 from mbs.app.cli.printing import note, print_json
-from mbs.app.cli.simulate import Q0, V0, Duration, MaxStep, Method, Step, Tau, Tolerance, assigned
+from mbs.app.cli.simulate import Q0, V0, Duration, Tau, assigned
 
 if TYPE_CHECKING:
     from mbs.app.tasks.sweeping import SweepTable
@@ -47,13 +47,10 @@ def sweep(
     *,
     over: Over,
     duration: Duration = "2",
-    step: Step = "0.01",
+    options: dict[str, Any],
     q0: Q0 = None,
     v0: V0 = None,
     tau: Tau = None,
-    tolerance: Tolerance = "1e-8",
-    method: Method = "dopri5",
-    max_step: MaxStep = "",
     folder: Folder = None,
     parameter: Parameters = None,
     gravity: Gravity = "",
@@ -67,19 +64,12 @@ def sweep(
     cases have empty fields. They are reported on the standard error, and the exit code is 1.
     """
     from mbs.app.tasks import simulation, sweeping
-    from mbs.app.tasks.simulation import assignments
+    from mbs.app.tasks.laws import assignments
 
     require_places(output)
     grid = sweeping.grid_of(assignments(over, "--over"))
     laws = assigned(q0=q0, v0=v0, tau=tau)
-    settings = simulation.SimulationSettings(
-        duration=duration,
-        step=step,
-        tolerance=tolerance,
-        method=method,
-        max_step=max_step,
-        **laws,
-    )
+    settings = simulation.SimulationSettings(duration=duration, options=options, **laws)
     table = sweeping.sweep(system(robot, parameter, gravity, mount), grid, settings, folder=folder)
     if output is not None:
         from mbs.files import write_text

@@ -126,7 +126,6 @@ def _turn(axis: int, angle: float) -> Array:
 
 
 __all__ = [
-    "METHODS",
     "Configuration",
     "ConfigurationList",
     "Near",
@@ -140,9 +139,6 @@ __all__ = [
 
 Seed = Sequence[float] | Mapping[str, float] | None
 Values = Mapping[str, float] | None
-
-METHODS = ("auto", "pieper", "paul", "general", "search")
-"""Methods of the inverse kinematics; "auto" selects the cheapest that fits the mechanism."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,8 +243,8 @@ def configurations(
         system: the mechanism.
         T: (4, 4) pose of the frame relative to the base [m].
         frame: body, named frame or number of a link; None for the terminal frame.
-        method: name in `METHODS`. The general method requires six joints; for other chains
-            "general" uses the search.
+        method: method of `mbs.models.inverse_geometry.solve`. The general method requires six
+            joints; for other chains "general" uses the search.
         seed: configuration from which distances are measured, and which gives the positions of
             joints outside the chain.
         locked: positions of locked joints, by name. Default: `locked_by_default`, with one joint

@@ -19,6 +19,7 @@ from mbs.app.tasks.options import keywords
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
+from mbs.export.c_options import CLibraryOptions
 from mbs.export.fmu.options import FmuOptions
 from mbs.export.robot_tables import robot_table
 from mbs.formats import RobotTable, write_toml
@@ -34,6 +35,7 @@ def c_library(
     system: System,
     keys: Sequence[str] = MODELS,
     options: Mapping[str, Mapping[str, Any]] | None = None,
+    library: Mapping[str, Any] | None = None,
 ) -> bytes:
     """Return a zip file of C source of models, a header, CMakeLists.txt and an example.
 
@@ -41,16 +43,31 @@ def c_library(
         system: open or closed system.
         keys: keys of the models, as in the menus.
         options: key to the options of that model. Default: the default options.
+        library: options of `mbs.export.c_library` by name, see `mbs.app.tasks.options.keywords`.
 
     Raises:
         ModelError: a key is unknown, the system does not have the model, or `keys` is empty.
+        ExportError: options of the library are invalid, see `mbs.export.c_library`.
     """
-    functions = c_functions(system, keys, options)
     name = file_stem(system)
     with tempfile.TemporaryDirectory(prefix="mbs-c-") as place:
-        folder = export.c_library(functions, Path(place) / name)
+        folder = write_c_library(system, Path(place) / name, keys, options, library)
         files = {f"{name}/{path.name}": path.read_bytes() for path in sorted(folder.iterdir())}
     return _zip(files)
+
+
+def write_c_library(
+    system: System,
+    folder: Path,
+    keys: Sequence[str] = MODELS,
+    options: Mapping[str, Mapping[str, Any]] | None = None,
+    library: Mapping[str, Any] | None = None,
+) -> Path:
+    """Write the files of `c_library` to a folder and return its path."""
+    functions = c_functions(system, keys, options)
+    return export.c_library(
+        functions, folder, **keywords(CLibraryOptions, library or {}, system.name)
+    )
 
 
 def c_functions(

@@ -5,21 +5,22 @@ from __future__ import annotations
 import csv
 import io
 import tempfile
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mbs import identification as identified_by
-from mbs.app.tasks.simulation import number
+from mbs.app.tasks.laws import number
+from mbs.app.tasks.options import keywords
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.errors import ModelError
 from mbs.identification import Identification, Record, Residuals
-from mbs.identification.methods import METHODS as _METHODS
-from mbs.identification.observations import EQUATIONS as _EQUATIONS
+from mbs.identification.options import IdentifyArguments
 from mbs.identification.record import csv_table
 from mbs.text import did_you_mean
 
@@ -104,12 +105,6 @@ def _without(name: str, there: Sequence[str]) -> str:
     )
 
 
-METHODS = tuple(_METHODS)
-"""Names of the estimation methods."""
-
-EQUATIONS = tuple(_EQUATIONS)
-"""Names of the models that provide the equations."""
-
 VELOCITIES = ("differences", "measured")
 """Sources of velocities: differences of positions, or the columns of the record."""
 
@@ -123,19 +118,14 @@ class IdentificationSettings:
     Attributes:
         bandwidth: bandwidth of the filters [Hz]; five to ten times the highest frequency of the
             motion.
-        method: estimation method, a name in `METHODS`.
-        equations: model of the equations, a name in `EQUATIONS`.
-        rotors: whether to estimate rotor inertias.
-        offsets: whether to estimate a constant effort of each joint.
         velocities: source of velocities, a name in `VELOCITIES`.
+        options: options of `mbs.identification.identify` by name, such as "method". The others
+            have their defaults.
     """
 
     bandwidth: float | str = 10.0
-    method: str = "weighted"
-    equations: str = "dynamic"
-    rotors: bool = True
-    offsets: bool = False
     velocities: str = "differences"
+    options: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,19 +242,21 @@ def identify(
         SolverError: a search for the base parameters did not end.
     """
     settings = settings or IdentificationSettings()
-    _check(system, settings)
+    require_system(system)
+    if settings.velocities not in VELOCITIES:
+        raise ModelError(
+            f"{system.name}: velocities is {settings.velocities!r};"
+            f" {did_you_mean(settings.velocities, VELOCITIES)}"
+        )
     record = record_of(system, content)
     measured = settings.velocities == "measured"
     found = identified_by.identify(
         system,
         record,
         number(settings.bandwidth, f"{system.name}: bandwidth [Hz]"),
-        settings.method,
-        equations=settings.equations,
         smoothing=identified_by.smoothed_with_velocity if measured else identified_by.smoothed,
-        rotors=settings.rotors,
-        offsets=settings.offsets,
         quiet=quiet,
+        **keywords(IdentifyArguments, settings.options, system.name),
     )
     return identified(found)
 
@@ -284,17 +276,6 @@ def identified(found: Identification) -> Identified:
         text=found.text(),
         bodies=found.bodies_table() if found.bodies is not None else "",
     )
-
-
-def _check(system: System, settings: IdentificationSettings) -> None:
-    choices = {
-        "method": (settings.method, METHODS),
-        "equations": (settings.equations, EQUATIONS),
-        "velocities": (settings.velocities, VELOCITIES),
-    }
-    for what, (given, known) in choices.items():
-        if given not in known:
-            raise ModelError(f"{system.name}: {what} is {given!r}; {did_you_mean(given, known)}")
 
 
 def _rows(found: Identification) -> tuple[EstimateRow, ...]:

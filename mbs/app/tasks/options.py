@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
-from mbs.app.tasks.simulation import number
+from mbs.app.tasks.laws import number
 from mbs.errors import ModelError
 from mbs.options import option_fields, value_kinds
 from mbs.text import did_you_mean
 
 
-def keywords(options: type, texts: Mapping[str, Any], where: str) -> dict[str, Any]:
+def keywords(
+    options: type,
+    texts: Mapping[str, Any],
+    where: str,
+    known: Mapping[str, float] | None = None,
+) -> dict[str, Any]:
     """Convert texts to the values of options.
 
     A number may be a text such as "pi/2". An empty text or list of an option that may be None
@@ -21,6 +26,7 @@ def keywords(options: type, texts: Mapping[str, Any], where: str) -> dict[str, A
         options: dataclass of the options.
         texts: text, list of texts or value of options by name. The others have their defaults.
         where: name of the system, for error messages.
+        known: values of the symbols that numbers may contain.
 
     Returns:
         Values by name.
@@ -41,5 +47,5 @@ def keywords(options: type, texts: Mapping[str, Any], where: str) -> dict[str, A
             raise ModelError(
                 f"{where}: there is no {name} {value!r}; {did_you_mean(value, get_args(hint))}"
             )
-        found[name] = number(value, f"{where}: {name}") if kind == "number" else value
+        found[name] = number(value, f"{where}: {name}", known) if kind == "number" else value
     return found

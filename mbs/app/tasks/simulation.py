@@ -3,184 +3,24 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import casadi
 import numpy as np
-from casadi import SX
 from numpy.typing import NDArray
 
+from mbs.app.tasks.laws import Laws, law_of_motion, law_of_time, number, numbers
+from mbs.app.tasks.options import keywords
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
-from mbs.errors import DescriptionError, ExpressionError, ModelError
-from mbs.expressions import (
-    Expression,
-    Number,
-    expression,
-    parameters_of,
-    to_float,
-    to_sx,
-    with_values,
-)
+from mbs.errors import ModelError
 from mbs.models.state.signals import effort_function, full_name
 from mbs.result import Result
 from mbs.simulate import run
 from mbs.simulate.device_inputs import input_function
-from mbs.text import did_you_mean, quoted
-
-# Laws that a user writes as text: numbers, and functions of time, positions and velocities.
-
-
-Laws = Mapping[str, float | str]
-"""Name of a joint or quantity to a number or a text of the grammar of `mbs.expressions`."""
-
-TIME = "t"
-"""Symbol of time [s] in a law."""
-
-_LONGEST = 1000
-
-
-def number(value: float | str, where: str, known: Mapping[str, float] | None = None) -> float:
-    """Return the value of a number that a user wrote, such as 0.3 or "pi/4 + A".
-
-    Args:
-        value: number or text.
-        where: system and quantity, for error messages.
-        known: values of the symbols that the text may contain.
-
-    Raises:
-        ExpressionError: the text is not in the grammar, or has no finite value.
-    """
-    read = _read(value, where)
-    _require_known(read, known or {}, where)
-    result = to_float(read, known)
-    if result is None:
-        raise ExpressionError(f"{where}: {quoted(value)} has no finite value; correct it")
-    return result
-
-
-def numbers(values: Laws, where: str, known: Mapping[str, float]) -> dict[str, float]:
-    """Convert the values of a mapping to numbers by `number`.
-
-    Raises:
-        ExpressionError: a value is not a number.
-    """
-    return {name: number(value, f"{where} of {name}", known) for name, value in values.items()}
-
-
-def assignments(texts: Iterable[str], what: str) -> dict[str, str]:
-    """Return names and values of texts such as "j1=0.3".
-
-    Args:
-        texts: texts of the form NAME=VALUE.
-        what: description of the texts, for error messages.
-
-    Raises:
-        DescriptionError: a text has no "=", a name or a value is empty, or a name occurs twice.
-    """
-    found: dict[str, str] = {}
-    for text in texts:
-        name, mark, value = (part.strip() for part in text.partition("="))
-        if not (name and mark and value):
-            raise DescriptionError(f"{what}: {quoted(text)} is no NAME=VALUE; write it as j1=0.3")
-        if name in found:
-            raise DescriptionError(f"{what}: {quoted(name)} is given twice; give it once")
-        found[name] = value
-    return found
-
-
-def law_of_motion(
-    system: System, laws: Laws, names: Sequence[str], known: Mapping[str, float], what: str
-) -> Callable[[SX, SX, SX], SX]:
-    """Return a vector of values as a function of (t, q, v); values without a law are zero.
-
-    A law may contain t, the positions and velocities of the system, such as `j1.q` and `j1.v`,
-    and the symbols of the system, which are replaced by numbers.
-
-    Args:
-        system: open or closed system.
-        laws: laws by name of the value.
-        names: names of all values, in the order of the vector.
-        known: values of the symbols of the system.
-        what: description of the laws, for error messages.
-
-    Raises:
-        ExpressionError: a law cannot be read, or contains an unknown symbol.
-    """
-    signals = (
-        *(f"{c.name}.q" for c in system.coordinates),
-        *(f"{s.name}.v" for s in system.speeds),
-    )
-    read = {
-        name: _law(law, f"{system.name}: {what} of {name}", (TIME, *signals), known)
-        for name, law in laws.items()
-    }
-
-    def values(t: SX, q: SX, v: SX) -> SX:
-        elements = casadi.vertsplit(casadi.vertcat(t, q, v))
-        symbols = dict(zip((TIME, *signals), elements, strict=True))
-        return casadi.vertcat(*(to_sx(read.get(name, 0.0), symbols) for name in names))
-
-    return values
-
-
-def law_of_time(
-    law: float | str, known: Mapping[str, float], where: str
-) -> float | Callable[[SX], SX]:
-    """Return a law of time as a number, or as a function of t if it depends on time.
-
-    Args:
-        law: number, or text of t and the symbols of the system.
-        known: values of the symbols.
-        where: system and quantity, for error messages.
-
-    Raises:
-        ExpressionError: the law cannot be read, or contains an unknown symbol.
-    """
-    read = _law(law, where, (TIME,), known)
-    if isinstance(read, Number):
-        return read.value
-    return lambda t: to_sx(read, {TIME: t})
-
-
-def _law(
-    law: float | str, where: str, signals: Sequence[str], known: Mapping[str, float]
-) -> Expression:
-    """Read a law, with numbers instead of the symbols of the system."""
-    values = {name: value for name, value in known.items() if name not in signals}
-    read = _read(law, where)
-    _require_known(read, [*signals, *values], where)
-    try:
-        known_law = with_values(read, values)
-    except ExpressionError as error:
-        raise ExpressionError(f"{where}: {error}") from None
-    worth = to_sx(known_law, {name: SX.sym(name) for name in signals})
-    if not casadi.symvar(worth) and not casadi.evalf(worth).is_regular():
-        raise ExpressionError(f"{where}: {quoted(law)} has no finite value; correct it")
-    return known_law
-
-
-def _read(value: float | str, where: str) -> Expression:
-    if isinstance(value, str) and len(value) > _LONGEST:
-        raise ExpressionError(
-            f"{where}: the text has {len(value)} characters; write at most {_LONGEST}"
-        )
-    return expression(value, where)
-
-
-def _require_known(read: Expression, known: Iterable[str], where: str) -> None:
-    names = list(known)
-    for parameter in parameters_of(read):
-        if parameter.name not in names:
-            remedy = did_you_mean(parameter.name, names) if names else "write numbers"
-            raise ModelError(f"{where}: there is no symbol {parameter.name!r} here; {remedy}")
-
-
-METHODS = ("dopri5", "rodas")
-"""Integration methods: "dopri5" is explicit, "rodas" is linearly implicit for stiff systems."""
+from mbs.simulate.options import MotionOptions, RunArguments
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +29,8 @@ class SimulationSettings:
 
     Attributes:
         duration: duration [s].
-        step: time between rows of the result [s].
+        options: options of `mbs.simulate.run` by name, such as "step". The others have their
+            defaults.
         q0: initial positions by name of the coordinate [rad or m]. Default: the position in the
             assembled configuration.
         configuration: all initial positions, instead of q0; they must close the loops. Empty to
@@ -200,13 +41,10 @@ class SimulationSettings:
         inputs: inputs of devices by name of the device: numbers or laws, as for tau.
         motion: laws of t for coordinates with prescribed motion, by names such as "j1.q".
         parameters: values of symbols of the system. Default: their default values.
-        tolerance: approximate error of the motion.
-        method: method, a name in `METHODS`.
-        max_step: maximum integration step [s]; empty for no limit.
     """
 
     duration: float | str = 2.0
-    step: float | str = 0.01
+    options: Mapping[str, Any] = field(default_factory=dict)
     q0: Laws = field(default_factory=dict)
     configuration: Sequence[float] = ()
     v0: Laws = field(default_factory=dict)
@@ -214,9 +52,6 @@ class SimulationSettings:
     inputs: Laws = field(default_factory=dict)
     motion: Laws = field(default_factory=dict)
     parameters: Laws = field(default_factory=dict)
-    tolerance: float | str = 1e-8
-    method: str = "dopri5"
-    max_step: float | str = ""
 
 
 def simulate(
@@ -252,16 +87,12 @@ def run_arguments(system: System, settings: SimulationSettings) -> dict[str, Any
         ModelError: a name is unknown or a joint has no motor, or the method is unknown.
     """
     require_system(system)
-    if settings.method not in METHODS:
-        raise ModelError(
-            f"{system.name}: there is no method {settings.method!r};"
-            f" {did_you_mean(settings.method, METHODS)}"
-        )
     where = system.name
     parameters = numbers(settings.parameters, f"{where}: parameter", {})
     known = known_values(system, parameters)
     return {
-        **_times(settings, where, known),
+        "duration": number(settings.duration, f"{where}: duration", known),
+        **keywords(MotionOptions, settings.options, where, known),
         "q0": _positions(system, settings, known),
         "v0": numbers(settings.v0, f"{where}: v0", known) or None,
         "tau": _efforts(system, settings.tau, known),
@@ -272,8 +103,6 @@ def run_arguments(system: System, settings: SimulationSettings) -> dict[str, Any
         }
         or None,
         "parameters": parameters or None,
-        "method": settings.method,
-        **_longest(settings, where, known),
     }
 
 
@@ -298,23 +127,6 @@ def csv_bytes(result: Result) -> bytes:
         path = Path(folder) / "result.csv"
         result.to_csv(path)
         return path.read_bytes()
-
-
-def _times(
-    settings: SimulationSettings, where: str, known: Mapping[str, float]
-) -> dict[str, float]:
-    return {
-        name: number(getattr(settings, name), f"{where}: {name}", known)
-        for name in ("duration", "step", "tolerance")
-    }
-
-
-def _longest(
-    settings: SimulationSettings, where: str, known: Mapping[str, float]
-) -> dict[str, float]:
-    if settings.max_step == "":
-        return {}
-    return {"max_step": number(settings.max_step, f"{where}: max_step", known)}
 
 
 def _positions(
@@ -395,7 +207,8 @@ def film(system: System, settings: SimulationSettings | None = None) -> Movie:
         MbsError: see `simulate`.
     """
     arguments = run_arguments(system, settings or SimulationSettings())
-    duration, step = arguments["duration"], arguments["step"]
+    chosen = RunArguments(system, **arguments)
+    duration, step = chosen.duration, chosen.step
     if step > 0 and duration / step > MOST_ROWS:
         raise ModelError(
             f"{system.name}: {duration:g} s in steps of {step:g} s are more than {MOST_ROWS} rows;"

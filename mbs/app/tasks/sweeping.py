@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mbs.app.tasks.simulation import SimulationSettings, number, run_arguments
+from mbs.app.tasks.laws import number
+from mbs.app.tasks.simulation import SimulationSettings, run_arguments
 from mbs.assembly import System
 from mbs.assembly.tables import EFFORT_UNIT
 from mbs.errors import ModelError

@@ -108,12 +108,3 @@ void frame_particular_velocity(const passage *g, const passage_frame *p, double 
     frame_solve_rows(g, p, p->rows.b, v);
     frame_velocity(g, p, v);
 }
-
-double frame_position_rate(const passage *g, const passage_rows *rows, int i, const double *v) {
-    double rate = 0.0;
-    int j;
-    if (g->size.nq == g->size.nv) return v[i];
-    for (j = g->patterns.N.begin[i]; j < g->patterns.N.begin[i + 1]; j++)
-        rate += rows->N[g->patterns.N.from[j]] * v[g->patterns.N.column[j]];
-    return rate;
-}

@@ -1,7 +1,7 @@
 /* All configurations of an arm that reach a pose, and whether they are certainly complete.
  *
  * Re-entrant: no globals and no allocation. Uncertain poses, near singular configurations, are left
- * to slower methods. `inverse_geometry/many.py` has the same rules and constants for batches.
+ * to slower methods. `inverse_geometry/draft_many.py` has the same rules and constants for batches.
  */
 #ifndef MBS_POSE_H
 #define MBS_POSE_H

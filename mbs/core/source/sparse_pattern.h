@@ -24,7 +24,7 @@ typedef unsigned long long row_set;
 #define ROW_WORDS(n) (((n) + ROW_BITS - 1) / ROW_BITS)
 
 /* Bit of a row in its word. */
-static inline row_set row_bit(int row) { return (row_set)1 << row % ROW_BITS; }
+static inline row_set row_bit(int row) { return (row_set)1 << (unsigned)row % ROW_BITS; }
 
 /* Index of the lowest bit of a nonzero word. */
 static inline int lowest_row(row_set bits) {

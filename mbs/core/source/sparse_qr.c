@@ -33,11 +33,6 @@ void sparse_qr_begin(sparse_qr *f, int n, int m) {
     f->height = n;
 }
 
-void sparse_qr_put(sparse_qr *f, int n, int i, int j, double value) {
-    f->A[j * n + i] = value;
-    f->filled[j * ROW_WORDS(n) + i / ROW_BITS] |= row_bit(i);
-}
-
 void sparse_qr_scan(sparse_qr *f, int n, int m) {
     int i, j;
     memset(f->filled, 0, sizeof *f->filled * (size_t)(m * ROW_WORDS(n)));

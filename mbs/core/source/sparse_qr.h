@@ -43,7 +43,10 @@ typedef struct {
 void sparse_qr_begin(sparse_qr *f, int n, int m);
 
 /* Set element (i, j) of A (n, m). */
-void sparse_qr_put(sparse_qr *f, int n, int i, int j, double value);
+static inline void sparse_qr_put(sparse_qr *f, int n, int i, int j, double value) {
+    f->A[j * n + i] = value;
+    f->filled[j * ROW_WORDS(n) + (unsigned)i / ROW_BITS] |= row_bit(i);
+}
 
 /* Find the nonzero elements of A (n, m) if it was not filled by sparse_qr_put. */
 void sparse_qr_scan(sparse_qr *f, int n, int m);

@@ -15,7 +15,7 @@ from mbs.assembly import System
 from mbs.errors import ExportError, ModelError
 from mbs.models.state.tree import TreeState
 from mbs.native.scalar_source import Target
-from mbs.options import described, faults
+from mbs.options import described, faults, one_of
 from mbs.text import quoted
 from mbs.units import UNITS
 from mbs.view.drawing import Drawing
@@ -91,6 +91,8 @@ def _check_functions(model: FmuModel) -> None:
         )
     if model.closure is not None:
         _check_shape(model, "closure", model.closure, (nx, nz, n_p), (nz, 1))
+    if model.cut_positions is not None:
+        _check_shape(model, "cuts", model.cut_positions, (nx, nz, n_p), (len(model.cuts),))
     if model.jumps is not None:
         point, k = (1, nx, nz, nu, n_p + n_m), len(model.jumps.names)
         _check_shape(model, "first", model.jumps.first, point, (n_m, k))
@@ -197,28 +199,35 @@ def _known_solver(label: str, value: object) -> str:
     return f"{label} is {value!r}; use {' or '.join(_SOLVERS)}"
 
 
-def _known_target(label: str, value: object) -> str:
-    if isinstance(value, str) and value in _TARGETS:
-        return ""
-    return f"{label} is {quoted(value)}; use {' or '.join(map(repr, _TARGETS))}"
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
     """Author and licence of a model. Empty texts are left out of the FMU."""
 
     author: str = field(
         default="",
-        metadata=described("person or organisation, for the model description.", check=printable),
+        metadata=described(
+            "person or organisation, for the model description.",
+            check=printable,
+            command="--author",
+        ),
     )
-    version: str = field(default="", metadata=described("version of the model.", check=printable))
+    version: str = field(
+        default="",
+        metadata=described("version of the model.", check=printable, command="--model-version"),
+    )
     copyright: str = field(
         default="",
-        metadata=described('copyright notice, such as "(c) 2026 Example Ltd.".', check=printable),
+        metadata=described(
+            'copyright notice, such as "(c) 2026 Example Ltd.".',
+            check=printable,
+            command="--copyright",
+        ),
     )
     license: str = field(
         default="",
-        metadata=described("name, text or address of the licence.", check=printable),
+        metadata=described(
+            "name, text or address of the licence.", check=printable, command="--license"
+        ),
     )
 
 
@@ -276,6 +285,7 @@ class Experiment:
             label="internal step",
             only_with=("solver", ("rk4",)),
             check=_positive,
+            command="--internal-step",
             in_form=True,
         ),
     )
@@ -300,7 +310,7 @@ class Experiment:
             " FMI 2.0 the callbacks of the importer allocate its memory, in FMI 3.0 two functions"
             ' in memory.c, which may be replaced. Results are bit-identical to target="hosted".',
             _TARGETS,
-            check=_known_target,
+            check=one_of(tuple(_TARGETS)),
             command="--bare",
             command_text="for microcontrollers: no heap, Co-Simulation by rk4 only, no events.",
         ),
@@ -405,10 +415,11 @@ Kind = Literal[
     "slot",
     "rate",
     "chart",
+    "cut",
 ]
 
 
-WITH_START: tuple[Kind, ...] = ("state", "input", "parameter", "dependent", "slot")
+WITH_START: tuple[Kind, ...] = ("state", "input", "parameter", "dependent", "slot", "cut")
 """Kinds of variables that have a start value."""
 
 
@@ -592,6 +603,8 @@ class FmuModel(Experiment):
         outputs: variables of y: the outputs that are not states.
         parameters: variables of p, tunable or fixed.
         dependents: variables of z, the coordinates that closed loops determine.
+        cuts: positions of the joints that are cut. Their start values are guesses too.
+        cut_positions: `cut_positions(x, z, p)`, positions of `cuts`; None if there are none.
         loop_size: size of the mechanism [m], the unit of distances of displacements from guesses.
         rhs: `rhs(t, x, z, u, p) -> (xdot, y)`.
         closure: `closure(x, z, p) -> (z_next, residual)`, one Newton step of z and the largest
@@ -614,7 +627,7 @@ class FmuModel(Experiment):
         documentation: text for `documentation/index.html`. A blank line starts a paragraph.
         terminals: groups of variables that are connected together.
         sources: names and texts of further C files, which are compiled with the FMU.
-        arrays: array variables of FMI 3.0, see `mbs.export.fmu.arrays`.
+        arrays: array variables of FMI 3.0, see `mbs.export.fmu.system_fmu`.
         about: tables and drawing of the documentation, or None.
     """
 
@@ -627,6 +640,8 @@ class FmuModel(Experiment):
     outputs: tuple[FmuVariable, ...] = ()
     parameters: tuple[FmuVariable, ...] = ()
     dependents: tuple[FmuVariable, ...] = ()
+    cuts: tuple[FmuVariable, ...] = ()
+    cut_positions: casadi.Function | None = None
     loop_size: float = 1.0
     closure: casadi.Function | None = None
     slopes: casadi.Function | None = None
@@ -714,6 +729,7 @@ class FmuModel(Experiment):
             ("slot", len(self.slots)),
             ("rate", len(self.slots)),
             ("chart", int(self.charted)),
+            ("cut", len(self.cuts)),
         )
         place = 0
         for name, count in order:
@@ -756,3 +772,4 @@ def _entries(model: FmuModel) -> Iterator[FmuEntry]:
     if model.charted:
         text = "positive while the present states serve"
         yield FmuEntry("chart", FmuVariable(name="indicator.coordinates", description=text))
+    yield from (FmuEntry("cut", v) for v in model.cuts)

@@ -76,6 +76,7 @@ _GROUPS: tuple[tuple[Kind, str], ...] = (
     ("slot", "States in Model Exchange"),
     ("rate", "Their derivatives"),
     ("chart", "Indicator that asks for other states"),
+    ("cut", "Positions of joints that are cut; the start values choose the branch"),
 )
 _FUNCTIONS = {
     "derivatives and outputs": "rhs",

@@ -22,9 +22,13 @@ from mbs.models._measurements import readings
 from mbs.models.geometry import terminal_frame
 from mbs.models.state.independent import DriveInputs, OutputContext
 from mbs.models.symbols import ExternalForces, ModelSymbols, outputs_of, symbols_of
-from mbs.recursions.poses import link_poses
+from mbs.recursions.link_motions import (
+    link_accelerations,
+    link_poses,
+    link_velocities,
+    resting_base,
+)
 from mbs.recursions.route import BASE, relative_acceleration, relative_motion, relative_pose
-from mbs.recursions.velocities import link_accelerations, link_velocities, resting_base
 from mbs.spatial import zeros
 from mbs.text import did_you_mean, quoted
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +10,12 @@ import casadi
 import numpy as np
 from casadi import DM, MX, SX, Function
 
-from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.sequence import StepSequence
 from mbs.errors import ExportError
 from mbs.export.fmu.description import FmuModel, FmuState, FmuVariable
 from mbs.export.fmu.documentation import about
+from mbs.export.fmu.options import InverseGeometryFmuArguments
 from mbs.export.fmu.pack import require_version, require_writable, write_fmu
 from mbs.export.fmu.variables import parameters
 from mbs.files import path_of
@@ -25,6 +23,7 @@ from mbs.models.geometry import terminal_frame, transform
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain
 from mbs.models.inverse_geometry.closed_form import all_branches, size
 from mbs.models.inverse_geometry.functions import steps_or_all
+from mbs.options import arguments_of
 
 _MEMORY = 0.01
 """Time constant [s] with which the states that select the branch follow the solution: shorter than
@@ -36,17 +35,8 @@ _MISSED = 1e-9
 arm: rounding of inputs in other tools."""
 
 
-def inverse_geometry_fmu(
-    system: System,
-    path: str | os.PathLike[str],
-    *,
-    method: str = "auto",
-    frame: str | int | None = None,
-    locked: Mapping[str, float] | None = None,
-    start: Mapping[str, float] | Sequence[float] | None = None,
-    fmi: str = "2.0",
-    platforms: Sequence[str] | None = None,
-) -> Path:
+@arguments_of(InverseGeometryFmuArguments)
+def inverse_geometry_fmu(options: InverseGeometryFmuArguments) -> Path:
     """Write the inverse geometric model (inverse kinematics) of an arm as an FMU.
 
     Inputs are the pose of the frame in the base: origin `tool.x`, `tool.y`, `tool.z` and rotation
@@ -58,15 +48,7 @@ def inverse_geometry_fmu(
     output `certain`. It is 0 if solutions may be missing, near singular configurations.
 
     Args:
-        system: open chain that has a closed form, or six joints without symbols.
-        path: file to write.
-        method: "pieper", "paul", "general", or "auto". "auto" takes the cheaper of the first two
-            closed forms, or the general method if both fail.
-        frame: body, named frame, index of a link, or None for the terminal frame.
-        locked: fixed positions of joints, by name [rad or m].
-        start: configuration at the start, (nq,) or by name. By default the assembled one.
-        fmi: version of FMI, "2.0" or "3.0".
-        platforms: names of target platforms. By default this computer.
+        options: see `InverseGeometryFmuArguments`.
 
     Returns:
         Path of the file.
@@ -78,19 +60,22 @@ def inverse_geometry_fmu(
         ModelError: a name is unknown, a parameter has no value, or more than six joints are free.
         CompilerError: no C compiler is installed, or a platform is unknown.
     """
+    system = options.system
     require_system(system)
-    require_version(system.name, fmi)
-    require_writable(path_of(path))
+    require_version(system.name, options.fmi)
+    require_writable(path_of(options.path))
     if system.is_closed:
         raise ExportError(
             f"{system.name}: its loops must be closed too, and no method does both; export an"
             " open chain"
         )
-    name = terminal_frame(system) if frame is None else frame
-    chain = frame_chain(system, name, locked)
-    first = np.array(system.position(start))
-    every = steps_or_all(chain, method)
-    return write_fmu(_model(chain, every, first), path, fmi=fmi, platforms=platforms)
+    name = terminal_frame(system) if options.frame is None else options.frame
+    chain = frame_chain(system, name, options.locked)
+    first = np.array(system.position(options.start))
+    every = steps_or_all(chain, options.method)
+    return write_fmu(
+        _model(chain, every, first), options.path, fmi=options.fmi, platforms=options.platforms
+    )
 
 
 def _model(chain: FrameChain, every: StepSequence | Function, start: np.ndarray) -> FmuModel:

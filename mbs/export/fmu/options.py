@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from mbs.assembly import System
 from mbs.assembly._symbolic import GROUPS
 from mbs.errors import ExportError
 from mbs.export.fmu.controller import Law
@@ -18,8 +19,8 @@ _OUTPUTS = tuple(shown.group for shown in KINDS.values() if shown.group)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Contents:
-    """Version and variables of an FMU, its controller and its platforms."""
+class FmuVersion:
+    """Version of FMI."""
 
     __slots__ = ()
 
@@ -33,6 +34,14 @@ class Contents:
             in_form=True,
         ),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contents:
+    """Variables of an FMU, its controller and the C files of the controller."""
+
+    __slots__ = ()
+
     inputs: Sequence[str] = field(
         default=(),
         metadata=described(
@@ -78,7 +87,8 @@ class Contents:
         default=(),
         metadata=described(
             "names of parameters that are constant after the initialization. All other parameters"
-            " are tunable."
+            " are tunable.",
+            command="--fixed",
         ),
     )
     flanges: Sequence[str] = field(
@@ -86,7 +96,8 @@ class Contents:
         metadata=described(
             "names of frames at which another part of a mechanism is coupled. Their poses,"
             " velocities and accelerations are outputs, and the wrenches on them are inputs. In"
-            " FMI 3.0 each flange is a terminal."
+            " FMI 3.0 each flange is a terminal.",
+            command="--flange",
         ),
     )
     controller: Law = field(
@@ -103,6 +114,14 @@ class Contents:
             "C files and headers of the controller, which are compiled with the FMU."
         ),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Platforms:
+    """Target platforms of an FMU."""
+
+    __slots__ = ()
+
     platforms: Sequence[str] | None = field(
         default=None,
         metadata=described(
@@ -123,13 +142,20 @@ class Additions:
 
     reference: bool = field(
         default=False,
-        metadata=described("whether to include the results of the default experiment."),
+        metadata=described(
+            "whether to include the results of the default experiment.",
+            command="--reference",
+            command_text="include the results of the default experiment.",
+        ),
     )
     arrays: bool = field(
         default=False,
         metadata=described(
             "whether positions, velocities, accelerations and efforts of the joints are the arrays"
-            " q, v, a and tau of FMI 3.0. Dependent joints are in `q_dependent` and so on."
+            " q, v, a and tau of FMI 3.0. Dependent joints are in `q_dependent` and so on.",
+            command="--arrays",
+            command_text="write motion and efforts of the joints as the arrays q, v, a and tau of"
+            " FMI 3.0.",
         ),
     )
     description: str = field(
@@ -137,13 +163,14 @@ class Additions:
         metadata=described(
             "one-line description. By default the first line of the report of the system.",
             check=lambda label, value: printable(label, value) if value else "",
+            command="--description",
         ),
     )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FmuOptions(Origin, Additions, Experiment, Contents):
-    """Options of `mbs.export.fmu`, in the order of its signature.
+class FmuOptions(Origin, Additions, Experiment, Platforms, Contents, FmuVersion):
+    """Options of an FMU, in the order of the signature of `mbs.export.fmu`.
 
     A dataclass takes the fields of its last base first.
     """
@@ -164,3 +191,52 @@ class FmuOptions(Origin, Additions, Experiment, Contents):
                 " or leave arrays out"
             )
         check_options(self, name)
+
+
+@dataclass(frozen=True, slots=True)
+class FmuArguments(FmuOptions):
+    """Arguments of `mbs.export.fmu`."""
+
+    system: System = field(metadata=described("assembled mechanism, open or closed."))
+    path: PathLike = field(metadata=described("file to write."))
+
+
+# Inverse geometric model of an arm.
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmPose:
+    """Method, frame and first configuration of an inverse geometric model."""
+
+    __slots__ = ()
+
+    method: str = field(
+        default="auto",
+        metadata=described(
+            '"pieper", "paul", "general", or "auto". "auto" takes the cheaper of the first two'
+            " closed forms, or the general method if both fail."
+        ),
+    )
+    frame: str | int | None = field(
+        default=None,
+        metadata=described("body, named frame, index of a link, or None for the terminal frame."),
+    )
+    locked: Mapping[str, float] | None = field(
+        default=None, metadata=described("fixed positions of joints, by name [rad or m].")
+    )
+    start: Mapping[str, float] | Sequence[float] | None = field(
+        default=None,
+        metadata=described(
+            "configuration at the start, (nq,) or by name. By default the assembled one."
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class InverseGeometryFmuArguments(Platforms, FmuVersion, ArmPose):
+    """Arguments of `mbs.export.inverse_geometry_fmu`."""
+
+    system: System = field(
+        metadata=described("open chain that has a closed form, or six joints without symbols.")
+    )
+    path: PathLike = field(metadata=described("file to write."))

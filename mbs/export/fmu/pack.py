@@ -14,12 +14,11 @@ from pathlib import Path
 
 from mbs.core import core_files
 from mbs.errors import ExportError
-from mbs.export.fmu import fmi2_xml, fmi3_xml
 from mbs.export.fmu.description import FmuModel, Solver
 from mbs.export.fmu.documentation import documentation, licence_files
 from mbs.export.fmu.reference import reference_files
 from mbs.export.fmu.source import header, source
-from mbs.export.fmu.xml import terminals_and_icons
+from mbs.export.fmu.xml import build_description, model_description, terminals_and_icons
 from mbs.files import path_of, write_bytes
 from mbs.native.compiler import (
     Platform,
@@ -185,20 +184,6 @@ def folder_of(platform: Platform, fmi: str) -> str:
 # Files of an FMU that are not compiled: descriptions, documentation, icon, licences.
 
 
-def description(model: FmuModel, fmi: str, identity: str, compiled: Sequence[str]) -> str:
-    """Return the text of the file modelDescription.xml.
-
-    Args:
-        model: description of the FMU.
-        fmi: version of the standard.
-        identity: identifier that the compiled library checks.
-        compiled: names of the C files to compile.
-    """
-    if fmi == "2.0":
-        return fmi2_xml.model_description(model, identity, compiled)
-    return fmi3_xml.model_description(model, identity)
-
-
 def plain_files(
     model: FmuModel, fmi: str, standard_header: str, compiled: Sequence[str]
 ) -> dict[str, bytes]:
@@ -217,7 +202,7 @@ def plain_files(
     drawn = model.about.drawing if model.about else None
     if fmi == "2.0":
         return files | ({"model.png": icon(drawn)} if drawn else {})
-    build = fmi3_xml.build_description(model, compiled)
+    build = build_description(model, compiled)
     files["sources/buildDescription.xml"] = build.encode()
     if drawn or model.terminals:
         files["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(model).encode()
@@ -225,11 +210,6 @@ def plain_files(
         files["terminalsAndIcons/icon.png"] = icon(drawn)
         files["terminalsAndIcons/icon.svg"] = standalone(drawn, model.name).encode()
     return files
-
-
-def standard_header(fmi: str) -> str:
-    """Return the name of the header of the standard that declares its functions."""
-    return FACES[fmi].standard[0]
 
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # date of all files, so that equal models give equal archives
@@ -269,7 +249,7 @@ def write_fmu(
     results = reference_files(model) if reference else {}
     face = FACES[fmi]
     (code, work), compiled = source(model, adjoint=face.adjoint), _compile(model, fmi)
-    unnamed = description(model, fmi, "", compiled)
+    unnamed = model_description(model, fmi, "", compiled)
     tables = header(model, "", work, adjoint=face.adjoint)
     guid = _guid(unnamed, tables, code, *(text for _, text in model.sources))
     named = header(model, guid, work, adjoint=face.adjoint)
@@ -278,7 +258,7 @@ def write_fmu(
     texts.update(model.sources)
     files = {
         "modelDescription.xml": _identify(unnamed, guid).encode(),
-        **plain_files(model, fmi, texts[standard_header(fmi)], compiled),
+        **plain_files(model, fmi, texts[face.standard[0]], compiled),
         **results,
         **_binaries(model, fmi, texts, goals),
         **{f"sources/{name}": text.encode() for name, text in texts.items()},

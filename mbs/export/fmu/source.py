@@ -35,8 +35,9 @@ def functions(model: FmuModel, *, adjoint: bool) -> tuple[casadi.Function, ...]:
         `mbs_adjoint(t, x, z, u, p, wxdot, wy, wz, wg) -> (gt, gx, gu, gp)`.
         For closed loops `mbs_closure(x, z, p) -> (z, residual)`, `mbs_sensitivity(x, z, p) ->
         steepness`, and `mbs_slopes(x, z, p) -> J` and `mbs_sines(x, z, p)` if the model has slopes
-        and sines. For tree equations `mbs_tree_rhs` and others of `TreeState`. For events
-        `mbs_first`, `mbs_indicators`, `mbs_jump` and, if available, `mbs_approaches` of `Jumps`,
+        and sines, and `mbs_cuts(x, z, p)` if it has cut joints. For tree equations `mbs_tree_rhs`
+        and others of `TreeState`. For events `mbs_first`, `mbs_indicators`, `mbs_jump` and, if
+        available, `mbs_approaches` of `Jumps`,
         and `mbs_rates(t, x, z, u, p, du) -> dg/dt` along the motion, where du are the derivatives
         of the inputs. Events on tree equations have `mbs_tree_indicators` and so on, without first.
         If the model has rules, `mbs_excess(x, p)`. For an implicit solver `mbs_jacobian(t, x, z, u,
@@ -89,6 +90,8 @@ def _loops(model: FmuModel, whole: list[casadi.MX]) -> list[casadi.Function]:
         found["slopes"] = [casadi.densify(model.slopes.call(loop)[0])]
     if model.sines is not None:
         found["sines"] = _dense(model.sines.call(loop))
+    if model.cut_positions is not None:
+        found["cuts"] = _dense(model.cut_positions.call(loop))
     return [casadi.Function(f"mbs_{name}", whole, values) for name, values in found.items()]
 
 
@@ -311,7 +314,8 @@ def _names_of_loops(model: FmuModel) -> tuple[str, ...]:
         return ()
     watched = ("mbs_slopes",) if model.slopes is not None else ()
     measured = ("mbs_sines",) if model.sines is not None else ()
-    return (*_LOOPS, *watched, *measured)
+    cut = ("mbs_cuts",) if model.cut_positions is not None else ()
+    return (*_LOOPS, *watched, *measured, *cut)
 
 
 _HEADER = """\
@@ -334,6 +338,7 @@ _HEADER = """\
 #define N_PASSIVE {n_passive}
 #define NS {ns}
 #define NC {nc}
+#define NCUT {ncut}
 /* elements of the arrays that the functions below take */
 #define SZ_ARG {work.arg}
 #define SZ_RES {work.res}
@@ -345,9 +350,11 @@ extern const char *const MODEL_NAMES[], *const MODEL_INDICATORS[];
 extern const char MODEL_FIXED[];
 /* 1 for states that the dependents follow from */
 extern const int MODEL_LEADS[];
-/* of the dependents: 1 for angles; what distances are divided by, 1 rad or the size of the loops */
+/* of the dependents, then of the cut joints: 1 for angles; what distances are divided by, 1 rad or
+ * the size of the loops */
 extern const int MODEL_TURNS[];
 extern const double MODEL_SPANS[];
+extern const int MODEL_QUATERNIONS[]; /* 1 for the first element of a quaternion of a cut joint */
 {arrays}/* diagonal blocks of the slopes of the closure: the end of each in rows and columns */
 extern const int MODEL_BLOCKS[], MODEL_ROWS[], MODEL_COLUMNS[];
 
@@ -418,6 +425,7 @@ def header(model: FmuModel, guid: str, work: WorkSize, *, adjoint: bool) -> str:
         n_passive=model.passive[2],
         ns=len(model.slots),
         nc=int(model.charted),
+        ncut=len(model.cuts),
         work=work,
         arrays=_ARRAYS if model.arrays else "",
         options=options + ("" if tree is None else _tree_sizes(model, tree)),
@@ -514,8 +522,10 @@ def _sentences(model: FmuModel) -> list[str]:
 def _lead_tables(model: FmuModel) -> list[str]:
     if model.closure is None:
         return []
-    units = [variable.unit for variable in model.dependents]
+    units = [variable.unit for variable in (*model.dependents, *model.cuts)]
+    firsts = (str(int(variable.name.endswith(".qw.solved"))) for variable in model.cuts)
     return [
+        *([_table("const int MODEL_QUATERNIONS", firsts)] if model.cuts else []),
         _table("const int MODEL_LEADS", map(str, leading_states(model.closure))),
         _table("const int MODEL_TURNS", (str(int(unit == "rad")) for unit in units)),
         _numbers("MODEL_SPANS", distance_units(units, model.loop_size)),

@@ -13,6 +13,7 @@ from mbs.components.custom import Friction, OneWay
 from mbs.errors import ModelError
 from mbs.export.fmu.description import FmuState, FmuVariable, Jumps, once
 from mbs.loops.closing import Closing, closure_parameters
+from mbs.loops.cut_positions import cut_positions
 from mbs.models.contacts import contacts_of
 from mbs.models.geometry import terminal_frame
 from mbs.models.state.crossings import CONTACTS
@@ -82,6 +83,15 @@ def dependents(
     return tuple(
         _position(system.coordinates[k], f"{system.coordinates[k].name}.solved", value)
         for k, value in zip(state.dependents, start, strict=True)
+    )
+
+
+def cuts(system: System) -> tuple[FmuVariable, ...]:
+    """Return the positions of joints that are cut. Their start values are guesses."""
+    start = cut_positions(system)(system.configuration, system.parameter_values())
+    return tuple(
+        _position(coordinate, f"{coordinate.name}.solved", float(value))
+        for coordinate, value in zip(system.cut_coordinates, start.nonzeros(), strict=True)
     )
 
 

@@ -1,296 +1,31 @@
-"""Common parts of the model descriptions of FMI 2.0 and 3.0."""
+"""modelDescription.xml, buildDescription.xml and terminalsAndIcons.xml of FMI 2.0 and 3.0."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Literal
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-import casadi
-
-from mbs.export.fmu.description import WITH_START, FmuEntry, FmuModel, FmuState, Kind, is_structured
+from mbs.export.fmu.dependencies import (
+    KINDS,
+    DependencyKind,
+    Known,
+    ModelStructure,
+    structure,
+    without,
+)
+from mbs.export.fmu.description import (
+    TIME,
+    WITH_START,
+    FmuEntry,
+    FmuModel,
+    FmuState,
+    FmuVariable,
+    is_structured,
+)
 from mbs.units import UNITS
 from mbs.version import __version__
-
-# Kind of the dependence of each function output on each input: a constant factor, or another kind.
-#
-# The sets of inputs on which a result depends, and the kinds of their factors, are propagated
-# through the scalar operations of the function.
-
-
-DependencyKind = Literal["constant", "fixed", "tunable", "discrete", "dependent"]
-KINDS: tuple[DependencyKind, ...] = ("constant", "fixed", "tunable", "discrete", "dependent")
-"""Kinds of FMI from least to greatest. A sum has the greatest kind of its terms."""
-
-_WORST = len(KINDS) - 1
-_Masks = tuple[int, ...]
-"""Bit masks of inputs, one per kind: the inputs of that kind or a greater kind."""
-
-_NONE: _Masks = (0,) * len(KINDS)
-_SUMS = (casadi.OP_ADD, casadi.OP_SUB)
-_SCALED = (casadi.OP_NEG, casadi.OP_TWICE, casadi.OP_ASSIGN)
-
-
-def linearity(
-    function: casadi.Function, levels: Sequence[DependencyKind]
-) -> list[list[dict[int, DependencyKind]]]:
-    """Return the dependencies of each output element of a function on the input elements.
-
-    If an output is linear in an input, the dependence has the kind of the factor: "constant",
-    "fixed", "tunable" or "discrete". Otherwise it is "dependent". For a function that is not an
-    SX graph, all dependencies of the sparsity pattern are "dependent".
-
-    Args:
-        function: CasADi function.
-        levels: kind of each input element, in order, when it is a factor of another input.
-
-    Returns:
-        For each output, a list with a dict for each element: index of the input element, counted
-        over all inputs, to kind.
-    """
-    if not function.is_a("SXFunction"):
-        return _by_sparsity(function)
-    weights = [KINDS.index(level) for level in levels]
-    found = _walk(function, _levels_of(weights))
-    return [[_read(masks) for masks in rows] for rows in found]
-
-
-def _walk(function: casadi.Function, level: Callable[[int], int]) -> list[list[_Masks]]:
-    work = [_NONE] * function.sz_w()
-    sizes = [function.numel_in(k) for k in range(function.n_in())]
-    first = [sum(sizes[:k]) for k in range(len(sizes))]
-    places_in = [_places(function.sparsity_in(k)) for k in range(function.n_in())]
-    places_out = [_places(function.sparsity_out(k)) for k in range(function.n_out())]
-    answer = [[_NONE] * function.numel_out(k) for k in range(function.n_out())]
-    for k in range(function.n_instructions()):
-        op, out = function.instruction_id(k), function.instruction_output(k)
-        given = function.instruction_input(k)
-        if op == casadi.OP_INPUT:
-            bit = 1 << (first[given[0]] + places_in[given[0]][given[1]])
-            work[out[0]] = (bit, *_NONE[1:])
-        elif op == casadi.OP_OUTPUT:
-            answer[out[0]][places_out[out[0]][out[1]]] = work[given[0]]
-        elif op == casadi.OP_CONST:
-            work[out[0]] = _NONE
-        else:
-            work[out[0]] = _combine(op, [work[i] for i in given], level)
-    return answer
-
-
-def _combine(op: int, terms: list[_Masks], level: Callable[[int], int]) -> _Masks:
-    a, b = terms[0], terms[-1]
-    if op in _SCALED:
-        return a
-    if op in _SUMS:
-        return _sum(a, b)
-    if op == casadi.OP_MUL:
-        return _product(a, b, level)
-    if op == casadi.OP_DIV:
-        return _product(a, _bend(b), level)
-    if op == casadi.OP_IF_ELSE_ZERO:
-        return _product(_bend(a), b, level)
-    return _sum(_bend(a), _bend(b))
-
-
-def _sum(a: _Masks, b: _Masks) -> _Masks:
-    return tuple(x | y for x, y in zip(a, b, strict=True))
-
-
-def _bend(a: _Masks) -> _Masks:
-    """Dependence after a nonlinear function: every input is "dependent"."""
-    return (a[0],) * len(KINDS)
-
-
-def _product(a: _Masks, b: _Masks, level: Callable[[int], int]) -> _Masks:
-    """Dependence of a product: the kind follows from the other factor.
-
-    An input on which both factors depend is "dependent", because the product is nonlinear in it.
-    """
-    both = a[0] & b[0]
-    raised = _sum(_raise_order(a, level(b[0])), _raise_order(b, level(a[0])))
-    return tuple(mask | both for mask in raised)
-
-
-def _raise_order(a: _Masks, kind: int) -> _Masks:
-    return tuple(a[0] if k <= kind else mask for k, mask in enumerate(a))
-
-
-def _levels_of(weights: Sequence[int]) -> Callable[[int], int]:
-    """Return a function that gives the kind index of a factor: the greatest kind of its inputs."""
-    groups = [sum(1 << k for k, w in enumerate(weights) if w == kind) for kind in range(len(KINDS))]
-
-    def level(mask: int) -> int:
-        return next((kind for kind in range(_WORST, 0, -1) if mask & groups[kind]), 0)
-
-    return level
-
-
-def _places(pattern: casadi.Sparsity) -> list[int]:
-    """Return the column-major element index of each structural nonzero."""
-    rows, columns = pattern.get_triplet()
-    return [r + c * pattern.size1() for r, c in zip(rows, columns, strict=True)]
-
-
-def _read(masks: _Masks) -> dict[int, DependencyKind]:
-    found: dict[int, DependencyKind] = {}
-    for kind, mask in zip(KINDS, masks, strict=True):
-        while mask:
-            bit = mask & -mask
-            found[bit.bit_length() - 1] = kind
-            mask ^= bit
-    return dict(sorted(found.items()))
-
-
-def _by_sparsity(function: casadi.Function) -> list[list[dict[int, DependencyKind]]]:
-    answer: list[list[dict[int, DependencyKind]]] = []
-    for output in range(function.n_out()):
-        rows: list[dict[int, DependencyKind]] = [{} for _ in range(function.numel_out(output))]
-        first = 0
-        for k in range(function.n_in()):
-            pattern = function.jac_sparsity(output, k)
-            for row, column in zip(*pattern.get_triplet(), strict=True):
-                rows[row][first + column] = "dependent"
-            first += function.numel_in(k)
-        answer.append(rows)
-    return answer
-
-
-# Dependencies of the calculated values of an FMU on states, inputs, parameters and time.
-
-
-Known = Mapping[int, DependencyKind]
-"""Dict from the value references on which a value depends, in increasing order, to the kind."""
-
-_ORDER: tuple[Kind, ...] = ("state", "dependent", "input", "parameter", "mode")
-
-
-@dataclass(frozen=True, slots=True)
-class Dependencies:
-    """Dependencies on states, inputs, parameters, modes and time, also through closed loops.
-
-    All are dicts from value references to dependencies. The reference of time is the number of
-    entries.
-
-    Attributes:
-        running: dependencies of each derivative, output and event indicator.
-        first: dependencies of the initial value of each mode.
-        jumping: dependencies of the value of each state after an event on the values before it.
-    """
-
-    running: Mapping[int, Known]
-    first: Mapping[int, Known]
-    jumping: Mapping[int, Known]
-
-
-def dependencies(model: FmuModel) -> Dependencies:
-    """Return the dependencies of all calculated values of a model.
-
-    A dependent coordinate is replaced by the states and parameters that determine it through its
-    own loop, not through all loops.
-
-    Args:
-        model: description of the FMU.
-    """
-    through = _through_loops(model)
-    running = _rows(model, model.rhs, ("derivative", "output"), through)
-    if model.jumps is None:
-        return Dependencies(running, {}, {})
-    running |= _rows(model, model.jumps.indicators, ("indicator",), through)
-    first = _rows(model, model.jumps.first, ("mode",), through)
-    jumping = _rows(model, model.jumps.jump, ("state",), through)
-    return Dependencies(running, first, jumping)
-
-
-def _rows(
-    model: FmuModel,
-    function: casadi.Function,
-    kinds: Sequence[Kind],
-    through: Sequence[Known],
-) -> dict[int, Known]:
-    """Return the dependencies of the first outputs of function(t, x, z, u, p), by value reference.
-
-    kinds: kind of variables of each output.
-    """
-    references = [len(model.entries)]
-    levels: list[DependencyKind] = ["dependent"]
-    for kind in _ORDER:
-        found = _references(model, kind)
-        references += found
-        levels += [_level(model, kind, reference) for reference in found]
-    extra = sum(function.numel_in(k) for k in range(function.n_in())) - len(references)
-    levels += ["dependent"] * extra
-    rows = linearity(function, levels)
-    z = range(model.first("dependent"), model.first("indicator"))
-    answer: dict[int, Known] = {}
-    for kind, output in zip(kinds, rows, strict=False):
-        for row, found_in in enumerate(output):
-            direct = {references[k]: how for k, how in found_in.items() if k < len(references)}
-            answer[model.first(kind) + row] = _resolve(direct, z, through)
-    return answer
-
-
-def _references(model: FmuModel, kind: Kind) -> range:
-    sizes = {
-        "state": len(model.states),
-        "dependent": len(model.dependents),
-        "input": len(model.inputs),
-        "parameter": len(model.parameters),
-        "mode": len(model.modes),
-    }
-    return range(model.first(kind), model.first(kind) + sizes[kind])
-
-
-def _level(model: FmuModel, kind: Kind, reference: int) -> DependencyKind:
-    """Return the kind of a variable when it is a factor."""
-    if kind == "mode":
-        return "discrete"
-    if kind != "parameter":
-        return "dependent"
-    return "fixed" if _is_fixed(model, reference) else "tunable"
-
-
-def _is_fixed(model: FmuModel, reference: int) -> bool:
-    return model.parameters[reference - model.first("parameter")].fixed
-
-
-def _resolve(direct: Known, z: range, through: Sequence[Known]) -> Known:
-    """Replace dependent coordinates by the states and parameters that determine them."""
-    known = {reference: how for reference, how in direct.items() if reference not in z}
-    for reference in direct:
-        if reference in z:
-            known |= through[reference - z.start]
-    return dict(sorted(known.items()))
-
-
-def _through_loops(model: FmuModel) -> list[Known]:
-    """Return the states and parameters that determine each dependent coordinate."""
-    if model.closure is None:
-        return []
-    moved = [set[int]() for _ in model.dependents]
-    for k, kind in ((0, "state"), (2, "parameter")):
-        first = model.first("state" if kind == "state" else "parameter")
-        for row, column in zip(*model.closure.jac_sparsity(0, k).get_triplet(), strict=True):
-            moved[row].add(first + column)
-    return [
-        dict.fromkeys(sorted(set[int]().union(*(moved[k] for k in reached))), "dependent")
-        for reached in _reached(model.closure)
-    ]
-
-
-def _reached(closure: casadi.Function) -> list[set[int]]:
-    """Return for each element of z the elements on which its Newton step depends (transitively)."""
-    reads = [{k} for k in range(closure.numel_out(0))]
-    for row, column in zip(*closure.jac_sparsity(0, 1).get_triplet(), strict=True):
-        reads[row].add(column)
-    for _ in reads:
-        wider = [set().union(*(reads[k] for k in row)) for row in reads]
-        if wider == reads:
-            break
-        reads = wider
-    return reads
-
 
 _CAUSALITY = {"input": "input", "output": "output", "parameter": "parameter", "mode": "output"}
 _VARIABILITY = {"parameter": "tunable", "mode": "discrete"}
@@ -305,138 +40,199 @@ _INITIAL = {
     "slot": "exact",
     "rate": "calculated",
     "chart": "calculated",
+    "cut": "approx",
 }
-_NOTHING: Known = {}
-TOOL = f"mbs {__version__}"
-CATEGORIES = {
+_TOOL = f"mbs {__version__}"
+_CATEGORIES = {
     "logAll": "all messages",
     "logStatusDiscard": "a step or an evaluation without an answer",
     "logStatusError": "calls that were refused",
 }
 
+_ABILITIES = {
+    "2.0": {
+        "canGetAndSetFMUstate": "true",
+        "canSerializeFMUstate": "true",
+        "providesDirectionalDerivative": "true",
+    },
+    "3.0": {
+        "canGetAndSetFMUState": "true",
+        "canSerializeFMUState": "true",
+        "providesDirectionalDerivatives": "true",
+        "providesAdjointDerivatives": "true",
+    },
+}
+_STEPPING = {
+    "2.0": {
+        "canHandleVariableCommunicationStepSize": "true",
+        "canInterpolateInputs": "true",
+        "maxOutputDerivativeOrder": "1",
+    },
+    "3.0": {
+        "canHandleVariableCommunicationStepSize": "true",
+        "maxOutputDerivativeOrder": "1",
+        "providesIntermediateUpdate": "true",
+        "mightReturnEarlyFromDoStep": "true",
+        "canReturnEarlyAfterIntermediateUpdate": "true",
+        "hasEventMode": "true",
+    },
+}
+# the closure of loops and events need each accepted step; no step may pass the stop time
+_EXCHANGE = {
+    "2.0": {"completedIntegratorStepNotNeeded": "false"},
+    "3.0": {"needsCompletedIntegratorStep": "true"},
+}
+_SEEN_WITHIN_STEPS = ("state", "derivative", "output", "rate")
 
-@dataclass(frozen=True, slots=True)
-class ModelStructure:
-    """Content of the XML element ModelStructure, by value references.
 
-    The reference of time is the number of entries.
+def model_description(model: FmuModel, fmi: str, identity: str, sources: Sequence[str] = ()) -> str:
+    """Return the text of the file modelDescription.xml.
 
-    Attributes:
-        outputs: outputs, including states and modes that are outputs.
-        derivatives: derivatives of the states.
-        indicators: event indicators.
-        initial: values that the initialization calculates.
-        running: dependencies of each output, derivative and indicator between events, without
-            modes and fixed parameters, which are constant then. Modes depend on nothing.
-        starting: dependencies of each value of `initial` at the start, of kind "constant" or
-            "dependent".
-        reset: states that an event may change.
+    Args:
+        model: description of the FMU.
+        fmi: version of the standard, "2.0" or "3.0".
+        identity: identifier that the compiled library checks.
+        sources: names of the C files to compile, in the folder `sources`; used by FMI 2.0.
     """
-
-    outputs: list[int]
-    derivatives: list[int]
-    indicators: list[int]
-    initial: list[int]
-    running: Mapping[int, Known]
-    starting: Mapping[int, Known]
-    reset: list[int]
-
-
-def structure(model: FmuModel) -> ModelStructure:
-    """Return the ModelStructure of a model."""
-    found = dependencies(model)
-    modes = range(model.first("mode"), model.first("dependent"))
-    numbered = enumerate(model.parameters, start=model.first("parameter"))
-    frozen = {*modes, *(ref for ref, parameter in numbered if parameter.fixed)}
-    running: dict[int, Known] = {
-        ref: _without(frozen, known) for ref, known in found.running.items()
-    }
-    shown = [k for k, state in enumerate(model.states) if state.output]
-    running |= dict.fromkeys(modes, _NOTHING)
-    reset = [k for k, known in found.jumping.items() if dict(known) != {k: "constant"}]
-    running.update({k: {k: "constant"} for k in shown})
-    starting = dict(found.running)
-    if model.charted:
-        reset = list(model.derived.values())
-        running |= _by_joints(model, running)
-        running = {ref: _through_all(model, known) for ref, known in running.items()}
-        starting |= _by_joints(model, found.running)
-    calculated = [*range(model.first("output"), model.first("parameter")), *modes]
-    derivatives = list(model.derived)
-    return ModelStructure(
-        outputs=shown + calculated,
-        derivatives=derivatives,
-        indicators=[
-            *range(model.first("indicator"), model.first("slot")),
-            *range(model.first("chart"), len(model.entries)),
-        ],
-        initial=derivatives + calculated,
-        running=running,
-        starting={
-            ref: _starting(
-                found.first.get(ref) or starting.get(ref, {}), found, modes, ref in modes
-            )
-            for ref in derivatives + calculated
-        },
-        reset=reset,
-    )
-
-
-def _by_joints(model: FmuModel, running: Mapping[int, Known]) -> dict[int, Known]:
-    """Dependencies of the states in charts.h: their derivatives, and the indicator of a change.
-
-    Each depends on all variables on which a derivative of the joint states depends.
-    """
-    n, every = len(model.states), dict[int, DependencyKind]()
-    for known in (running[n + k] for k in range(n)):
-        every |= dict.fromkeys(known, KINDS[-1])
-    return {ref: every for ref in (*model.derived, model.first("chart"))}
-
-
-def _through_all(model: FmuModel, known: Known) -> Known:
-    """Replace a dependence on a joint state by one on all states of the external integrator.
-
-    Near a singular configuration these states are tangent coordinates, which move all joints.
-    """
-    states, slots = range(len(model.states)), model.derived.values()
-    if not any(ref in states for ref in known):
-        return known
-    rest = {ref: kind for ref, kind in known.items() if ref not in states}
-    return dict(sorted((rest | dict.fromkeys(slots, KINDS[-1])).items()))
-
-
-def _without(references: Container[int], known: Known) -> dict[int, DependencyKind]:
-    return {ref: kind for ref, kind in known.items() if ref not in references}
-
-
-def _starting(known: Known, found: Dependencies, modes: range, whole: bool) -> Known:
-    """Return the dependencies of a value at the start, with modes replaced by their dependencies.
-
-    whole: whether the value is an integer, such as a mode. An integer is linear in no variable.
-    """
-    direct: dict[int, DependencyKind] = {
-        ref: "constant" if kind == "constant" and not whole else "dependent"
-        for ref, kind in known.items()
-        if ref not in modes
-    }
-    for mode in (ref for ref in known if ref in modes):
-        direct |= dict.fromkeys((ref for ref in found.first[mode] if ref not in modes), "dependent")
-    return dict(sorted(direct.items()))
-
-
-def texts(model: FmuModel) -> dict[str, str]:
-    """Return the texts of a model that are not empty: description, author, version, ...."""
-    said = {"description": model.description, **asdict(model.origin)}
-    return {name: text for name, text in said.items() if text}
-
-
-def naming_convention(model: FmuModel) -> str:
-    """Return "structured" if all names are paths such as `j1.q`, else "flat"."""
+    found = structure(model)
     fits = all(is_structured(entry.variable.name) for entry in model.entries)
-    return "structured" if fits else "flat"
+    texts = {"description": model.description, **asdict(model.origin)}
+    attributes = {
+        "fmiVersion": fmi,
+        "modelName": model.name,
+        "guid" if fmi == "2.0" else "instantiationToken": identity,
+        **{name: text for name, text in texts.items() if text},
+        "generationTool": _TOOL,
+        "variableNamingConvention": "structured" if fits else "flat",
+    }
+    if fmi == "2.0":
+        attributes["numberOfEventIndicators"] = str(len(found.indicators))
+    root = Element("fmiModelDescription", attributes)
+    if model.target == "hosted":
+        _interface(root, "ModelExchange", model, fmi, sources)
+    _interface(root, "CoSimulation", model, fmi, sources)
+    _units(root, model)
+    _categories_and_experiment(root, model)
+    _variables(root, model, found, fmi)
+    parent = SubElement(root, "ModelStructure")
+    (_structure_2 if fmi == "2.0" else _structure_3)(parent, model, found)
+    return text_of(root)
 
 
-def variable_attributes(reference: int, entry: FmuEntry) -> dict[str, str]:
+def build_description(model: FmuModel, sources: Iterable[str]) -> str:
+    """Return the text of the file buildDescription.xml of FMI 3.0, which lists the sources.
+
+    Args:
+        model: description of the FMU.
+        sources: names of the C files to compile, in the folder `sources`.
+    """
+    root = Element("fmiBuildDescription", fmiVersion="3.0")
+    build = SubElement(root, "BuildConfiguration", modelIdentifier=model.identifier)
+    files = SubElement(build, "SourceFileSet", language="C99")
+    for name in sources:
+        SubElement(files, "SourceFile", name=name)
+    return text_of(root)
+
+
+def _interface(root: Element, tag: str, model: FmuModel, fmi: str, sources: Sequence[str]) -> None:
+    attributes = {"modelIdentifier": model.identifier}
+    if fmi == "2.0":
+        hosted = str(model.target == "hosted").lower()
+        attributes["canNotUseMemoryManagementFunctions"] = hosted
+    attributes |= _ABILITIES[fmi] | (_STEPPING if tag == "CoSimulation" else _EXCHANGE)[fmi]
+    if fmi == "3.0" and tag == "CoSimulation" and model.solver == "rk4":
+        attributes["fixedInternalStepSize"] = repr(float(model.internal_step))
+    interface = SubElement(root, tag, attributes)
+    if fmi == "2.0":
+        files = SubElement(interface, "SourceFiles")
+        for name in sources:
+            SubElement(files, "File", name=name)
+
+
+def _variables(root: Element, model: FmuModel, found: ModelStructure, fmi: str) -> None:
+    variables, derived = SubElement(root, "ModelVariables"), model.derived
+    reset = _of_arrays(model, found.reset)
+    for shown in _list_variables(model):
+        reference, entry = shown.reference, shown.entry
+        attributes, own = _attributes(reference, entry), _integer_attributes(entry)
+        if entry.kind != "mode":
+            own = _real_attributes(shown)
+            if reference in derived:
+                own["derivative"] = str(derived[reference] + _first(fmi))
+            if reference in reset:
+                own["reinit"] = "true"
+        if fmi == "2.0":
+            scalar = SubElement(variables, "ScalarVariable", attributes)
+            SubElement(scalar, "Integer" if entry.kind == "mode" else "Real", own)
+            continue
+        if entry.kind in _SEEN_WITHIN_STEPS:
+            own["intermediateUpdate"] = "true"
+        kind = "Int32" if entry.kind == "mode" else "Float64"
+        variable = SubElement(variables, kind, attributes | own)
+        if shown.array:
+            SubElement(variable, "Dimension", start=str(len(shown.elements)))
+    if fmi == "3.0":
+        SubElement(
+            variables,
+            "Float64",
+            name=TIME,
+            valueReference=str(len(model.entries)),
+            causality="independent",
+            variability="continuous",
+            unit="s",
+            description="time",
+        )
+
+
+def _first(fmi: str) -> int:
+    """Return the number of the variable with value reference 0: FMI 2.0 counts from 1."""
+    return 1 if fmi == "2.0" else 0
+
+
+def _structure_2(parent: Element, model: FmuModel, found: ModelStructure) -> None:
+    """Append outputs, derivatives and initial unknowns.
+
+    Parameters, which are constant in a run, and time are left out: FMI 2.0 assumes that all values
+    depend on time if no variable is the time.
+    """
+    time = len(model.entries)
+    fixed = (*range(model.first("parameter"), model.first("mode")), time)
+    for tag, references, depends, constant in (
+        ("Outputs", found.outputs, found.running, fixed),
+        ("Derivatives", found.derivatives, found.running, fixed),
+        ("InitialUnknowns", found.initial, found.starting, (time,)),
+    ):
+        if references:
+            group = SubElement(parent, tag)
+            for reference in references:
+                known = without(constant, depends[reference])
+                _unknown(group, "Unknown", "index", (reference, known), "2.0")
+
+
+def _structure_3(parent: Element, model: FmuModel, found: ModelStructure) -> None:
+    running = _dependencies_of_arrays(model, found.running)
+    starting = _dependencies_of_arrays(model, found.starting)
+    for tag, references, depends in (
+        ("Output", found.outputs, running),
+        ("ContinuousStateDerivative", found.derivatives, running),
+        ("InitialUnknown", found.initial, starting),
+        ("EventIndicator", found.indicators, running),
+    ):
+        for reference in _of_arrays(model, references):
+            _unknown(parent, tag, "valueReference", (reference, depends[reference]), "3.0")
+
+
+def _unknown(parent: Element, tag: str, key: str, unknown: tuple[int, Known], fmi: str) -> None:
+    (reference, known), first = unknown, _first(fmi)
+    attributes = {
+        key: str(reference + first),
+        "dependencies": " ".join(str(k + first) for k in known),
+        "dependenciesKind": " ".join(known.values()),
+    }
+    SubElement(parent, tag, attributes)
+
+
+def _attributes(reference: int, entry: FmuEntry) -> dict[str, str]:
     """Return name, reference, causality, variability, description and initial of a variable."""
     v = entry.variable
     attributes = {
@@ -454,29 +250,30 @@ def variable_attributes(reference: int, entry: FmuEntry) -> dict[str, str]:
     return attributes
 
 
-def real_attributes(entry: FmuEntry) -> dict[str, str]:
+def _real_attributes(shown: _Listed) -> dict[str, str]:
     """Return the XML attributes unit, bounds, nominal and start of a variable."""
-    v = entry.variable
-    real = {"unit": v.unit}
-    display = UNITS[v.unit].display
-    if display:
-        real["displayUnit"] = display
+    v, real = shown.entry.variable, dict[str, str]()
+    if shown.united:
+        real["unit"] = v.unit
+        display = UNITS[v.unit].display
+        if display:
+            real["displayUnit"] = display
     for name, bound in (("min", v.min), ("max", v.max)):
         if bound is not None and math.isfinite(bound):
             real[name] = repr(float(bound))
     real["nominal"] = repr(float(v.nominal))
-    if entry.kind in WITH_START or v.guess:
-        real["start"] = repr(float(v.start))
+    if shown.entry.kind in WITH_START or v.guess:
+        real["start"] = shown.start
     return real
 
 
-def integer_attributes(entry: FmuEntry) -> dict[str, str]:
+def _integer_attributes(entry: FmuEntry) -> dict[str, str]:
     """Return the XML attributes min and max of a mode, which is an integer."""
     bounds = (("min", entry.variable.min), ("max", entry.variable.max))
     return {name: str(int(bound)) for name, bound in bounds if bound is not None}
 
 
-def add_units(root: Element, model: FmuModel) -> None:
+def _units(root: Element, model: FmuModel) -> None:
     """Append the definitions, by base units, of all units that occur in the model."""
     definitions = SubElement(root, "UnitDefinitions")
     for name in sorted({entry.variable.unit for entry in model.entries} | {"s"}):
@@ -488,10 +285,10 @@ def add_units(root: Element, model: FmuModel) -> None:
             SubElement(element, "DisplayUnit", name=unit.display, factor=factor)
 
 
-def add_categories_and_experiment(root: Element, model: FmuModel) -> None:
+def _categories_and_experiment(root: Element, model: FmuModel) -> None:
     """Append the log categories, and the times and tolerance of the default experiment."""
     categories = SubElement(root, "LogCategories")
-    for name, text in CATEGORIES.items():
+    for name, text in _CATEGORIES.items():
         SubElement(categories, "Category", name=name, description=text)
     SubElement(
         root,
@@ -501,6 +298,85 @@ def add_categories_and_experiment(root: Element, model: FmuModel) -> None:
         tolerance=repr(model.tolerance),
         stepSize=repr(model.step_size),
     )
+
+
+# Array variables of FMI 3.0.
+
+
+@dataclass(frozen=True, slots=True)
+class _Listed:
+    """Variable of the model description: a scalar or an array.
+
+    Attributes:
+        reference: value reference of the variable, which is that of its first element.
+        entry: the variable. An array has the attributes of its first element, its own name and
+            description, the largest nominal value and no bounds.
+        elements: variables of the elements, a single variable for a scalar.
+        array: whether the variable is an array.
+    """
+
+    reference: int
+    entry: FmuEntry
+    elements: tuple[FmuVariable, ...]
+    array: bool
+
+    @property
+    def start(self) -> str:
+        """Start values of all elements, separated by spaces."""
+        return " ".join(repr(float(v.start)) for v in self.elements)
+
+    @property
+    def united(self) -> bool:
+        """Whether all elements have the same unit, so that the variable can have it."""
+        return len({v.unit for v in self.elements}) == 1
+
+
+def _list_variables(model: FmuModel) -> list[_Listed]:
+    """Return the variables of a model by value reference, each array as a single variable."""
+    entries, arrays = model.entries, {array.first: array for array in model.arrays}
+    found, place = [], 0
+    while place < len(entries):
+        array, entry = arrays.get(place), entries[place]
+        size = array.size if array else 1
+        elements = tuple(e.variable for e in entries[place : place + size])
+        if array is not None:
+            shared = replace(
+                entry.variable,
+                name=array.name,
+                description=array.description,
+                nominal=max(v.nominal for v in elements),
+                min=None,
+                max=None,
+            )
+            entry = FmuEntry(entry.kind, shared)
+        found.append(_Listed(place, entry, elements, array is not None))
+        place += size
+    return found
+
+
+def _of_arrays(model: FmuModel, references: Iterable[int]) -> list[int]:
+    """Replace value references of array elements by that of their array, without duplicates."""
+    owner = _owners(model)
+    return list(dict.fromkeys(owner.get(reference, reference) for reference in references))
+
+
+def _dependencies_of_arrays(model: FmuModel, known: Mapping[int, Known]) -> dict[int, Known]:
+    """Merge dependencies of array elements into dependencies of arrays.
+
+    An array depends on all variables on which an element depends, with the greatest kind.
+    """
+    owner, found = _owners(model), dict[int, dict[int, DependencyKind]]()
+    for reference, row in known.items():
+        into = found.setdefault(owner.get(reference, reference), {})
+        for other, kind in row.items():
+            whole = owner.get(other, other)
+            into[whole] = max(into.get(whole, kind), kind, key=KINDS.index)
+    return {reference: dict(sorted(row.items())) for reference, row in found.items()}
+
+
+def _owners(model: FmuModel) -> dict[int, int]:
+    """Return dict from the value reference of each array element to that of its array."""
+    return {a.first + k: a.first for a in model.arrays for k in range(a.size)}
 
 
 def text_of(root: Element) -> str:

@@ -37,12 +37,12 @@ from mbs.components import (
     Spherical,
     Spring,
 )
+from mbs.components.component import component_name
 from mbs.components.locking import FREE_JOINT, Base
 from mbs.errors import DescriptionError
-from mbs.formats.files import component_name
+from mbs.formats.files import Notes
 from mbs.formats.meshes import MeshFiles
 from mbs.formats.mjcf.shared import numbered_name
-from mbs.formats.notes import Notes
 from mbs.formats.rotations import matrix_of_quaternion
 from mbs.formats.xml import parse_xml
 from mbs.mechanism import Mechanism

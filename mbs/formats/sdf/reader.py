@@ -35,10 +35,10 @@ from mbs.components import (
     Spherical,
     Universal,
 )
+from mbs.components.component import component_name
 from mbs.components.locking import FREE_JOINT, Base
 from mbs.errors import DescriptionError
-from mbs.formats.files import component_name
-from mbs.formats.notes import Notes
+from mbs.formats.files import Notes
 from mbs.formats.rotations import inverse, matrix_of_angles, quaternion_of, transform
 from mbs.formats.sdf.shared import MODEL_GRAVITY, ROTOR_INERTIA
 from mbs.formats.urdf.reader import Inertial, KeptNames, Reader, Vector, body_of

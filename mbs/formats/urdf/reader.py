@@ -32,13 +32,13 @@ from mbs.components import (
     Revolute,
     Shape,
 )
+from mbs.components.component import component_name
 from mbs.components.locking import FREE_JOINT, Base
 from mbs.components.notes import NoteKind
 from mbs.errors import DescriptionError
 from mbs.expressions import plain_numbers
-from mbs.formats.files import component_name, read_bytes
+from mbs.formats.files import Notes, read_bytes
 from mbs.formats.meshes import MeshFiles
-from mbs.formats.notes import Notes
 from mbs.formats.urdf.shared import MOMENTS, REDUCTION, ROTOR, UNLIMITED
 from mbs.formats.xml import line_of, parse_content
 from mbs.mechanism import Mechanism

@@ -26,8 +26,7 @@ from mbs.components.joints import Freedom, Motion
 from mbs.identification.grouping.numeric import dependence, plain
 from mbs.identification.grouping.rules import Key, lambda_transform, on_link
 from mbs.loops.reduction import reduction_matrix
-from mbs.recursions.poses import base_poses, link_poses
-from mbs.recursions.velocities import link_velocities
+from mbs.recursions.link_motions import base_poses, link_poses, link_velocities
 from mbs.solvers.rank import first_best
 from mbs.spatial import Pose, align_z, nearest_rotation
 from mbs.spatial.inertia import TEN_PARAMETERS

@@ -16,10 +16,8 @@ from mbs.closed_forms.arm_search import examine_arm
 from mbs.errors import ModelError
 from mbs.loops.pose import goal
 from mbs.models.geometry import terminal_frame
-from mbs.models.inverse_geometry.path_equations import Follower, smallest
-from mbs.models.inverse_geometry.path_follower import follower
+from mbs.models.inverse_geometry.path_equations import PathJoints, Redundancy, path_joints, smallest
 from mbs.models.inverse_geometry.path_poses import Path, path_of
-from mbs.models.inverse_geometry.path_redundancy import Redundancy
 from mbs.models.inverse_geometry.path_state import path_state
 from mbs.models.inverse_geometry.path_tracking import track
 from mbs.models.inverse_geometry.solutions import Given
@@ -121,21 +119,21 @@ def follow(
     poses = path_of(system, path, samples)
     q = _start(system, start, locked)
     target = goal(system, name, np.eye(4), None, parameters)
-    led = follower(target, q, locked, limits, redundancy)
-    state = path_state(led, poses, q)
+    joints = path_joints(target, q, locked, limits, redundancy)
+    state = path_state(joints, poses, q)
     reason, number = track(state), state.number
     rows, x = np.tile(q, (number, 1)), state.found[:number]
-    rows[:, list(led.indices)] = x * led.scale
-    last, missed = led.whole(q, state.point.x), state.residual[:number]
-    return Followed(rows, number - 1, reason, missed, last, _conditioning(led, poses, x))
+    rows[:, list(joints.indices)] = x * joints.scale
+    last, missed = joints.whole(q, state.point.x), state.residual[:number]
+    return Followed(rows, number - 1, reason, missed, last, _conditioning(joints, poses, x))
 
 
-def _conditioning(led: Follower, poses: Path, x: Array) -> Conditioning:
+def _conditioning(joints: PathJoints, poses: Path, x: Array) -> Conditioning:
     """Return the data for the smallest singular values at scaled configurations x (k, n)."""
-    if led.chain is not None:
-        return Conditioning(led.chain.arm(led.target.closing.p), x)
-    J = [led.rows(one, T)[1] for one, T in zip(x, poses.poses, strict=False)]
-    return Conditioning(None, np.array([smallest(led.tracker, one) for one in J]))
+    if joints.chain is not None:
+        return Conditioning(joints.chain.arm(joints.target.closing.p), x)
+    J = [joints.rows(one, T)[1] for one, T in zip(x, poses.poses, strict=False)]
+    return Conditioning(None, np.array([smallest(joints, one) for one in J]))
 
 
 def _start(system: System, start: Any, locked: Mapping[str, float] | None) -> Array:

@@ -18,7 +18,7 @@ from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry._follow import Followed
 from mbs.models.inverse_geometry._follow import follow as follow_poses
 from mbs.models.inverse_geometry._solve import solve
-from mbs.models.inverse_geometry._solve_many import ManySolutions, solve_many
+from mbs.models.inverse_geometry._solve_many import solve_many
 from mbs.models.inverse_geometry.answer import NO_LOOP
 from mbs.models.inverse_geometry.chain import (
     FrameChain,
@@ -26,11 +26,11 @@ from mbs.models.inverse_geometry.chain import (
     target_pose,
     target_poses,
 )
-from mbs.models.inverse_geometry.path_redundancy import Redundancy
+from mbs.models.inverse_geometry.path_equations import Redundancy
 from mbs.models.inverse_geometry.redundancy import Locked, Redundant
 from mbs.models.inverse_geometry.solutions import (
     Given,
-    RobotSolution,
+    ManySolutions,
     Solution,
     Solutions,
     SolveOptions,
@@ -214,10 +214,10 @@ class FreeOrientation:
             # the virtual joints keep the last virtual link at the start orientation
             return self._pose(T, T0[:3, :3])
 
-        led: Any = (lambda s: posed(path(s))) if callable(path) else np.array([*map(posed, path)])
+        poses: Any = (lambda s: posed(path(s))) if callable(path) else np.array([*map(posed, path)])
         found = follow_poses(
             self.robot,
-            led,
+            poses,
             own,
             "tool",
             samples=samples,
@@ -242,8 +242,8 @@ class FreeOrientation:
         held = {k for k, c in enumerate(system.coordinates) if c.name in still}
         held |= {k for coupling in system.couplings for k in coupling.coordinates}
         ends = bounds(system, limits, set(range(system.nq)) - held)
-        wishes = SolveOptions(system, near, ends, leaves_out(limits), seed is not None)
-        drafts, others = list[RobotSolution](), list[Array]()
+        options = SolveOptions(system, near, ends, leaves_out(limits), seed is not None)
+        whole, others = list[Solution](), list[Array]()
         for solution in found:
             x = solution.q[:n]
             if any(self._is_same(x, other) for other in others):
@@ -251,14 +251,14 @@ class FreeOrientation:
             others.append(x)
             missed, sigma = self._missed(x, target), self._singular_value(x, still)
             for one in close(system, self.chain, x[None], self.p, near):
-                label = "; ".join(part for part in (self._branch(solution), one.label) if part)
+                label = "; ".join(part for part in (self._branch(solution), one.branch) if part)
                 missed_at, count = max(missed, one.residual), self._count(solution)
-                drafts.append(RobotSolution(one.q, label, missed_at, sigma, count))
+                whole.append(Solution(one.q, label, missed_at, sigma, count))
         method = found.method
         if why_searched(system, self.chain) is not None:
             method += ", loops by search"
-        reason = found.reason or ("" if drafts else NO_LOOP)
-        return wishes.solutions(drafts, method, reason)
+        reason = found.reason or ("" if whole else NO_LOOP)
+        return options.solutions(whole, method, reason)
 
     def _require_open(self, what: str, instead: str) -> None:
         if self.system.is_closed:

@@ -12,40 +12,32 @@ from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Array
 from mbs.closed_forms.arm_search import nearest
-from mbs.errors import ModelError, NoClosedForm
-from mbs.models.inverse_geometry.answer import (
-    Examined,
-    PoseProblem,
-    answer,
-    named,
-    new_among,
-    roots,
-)
+from mbs.errors import ModelError
+from mbs.models.inverse_geometry.answer import PoseProblem, answer, with_names
 from mbs.models.inverse_geometry.branches import branch_labels
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose
-from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, require_method, sequence_of
-from mbs.models.inverse_geometry.clusters import separated
-from mbs.models.inverse_geometry.gathering import (
+from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, require_method, sequence_or_none
+from mbs.models.inverse_geometry.draft import (
     METHODS,
-    Gathered,
-    beside,
-    by_search,
-    gather,
-    gather_further,
-    joined,
+    extend_draft,
+    join_drafts,
+    pose_draft,
+    search_draft,
+    valley_draft,
 )
-from mbs.models.inverse_geometry.kernel import PoseKernel, kernel_of
+from mbs.models.inverse_geometry.draft_compiled import PoseKernel, kernel_of
 from mbs.models.inverse_geometry.redundancy import LockedSamples, Redundant, samples_of
-from mbs.models.inverse_geometry.root import ChainRoot
 from mbs.models.inverse_geometry.solutions import (
     Given,
-    RegularSolutions,
+    PoseDraft,
+    Solution,
     Solutions,
     SolveOptions,
     bounds,
     leaves_out,
 )
 from mbs.models.inverse_geometry.target import Target, nearly_singular
+from mbs.models.inverse_geometry.verify import Examined, merge_connected, new_among, verify
 from mbs.models.inverse_geometry.whole_robot import parallel
 
 
@@ -94,8 +86,8 @@ def solve(
     """
     require_system(system)
     if redundant is None:
-        shell = _shell_of(system, frame, method, limits, locked, parameters)
-        found = None if shell is None else shell.solutions(T, seed)
+        prepared = _prepared_frame(system, frame, method, limits, locked, parameters)
+        found = None if prepared is None else prepared.solutions(T, seed)
         if found is not None:
             return found
     target = target_pose(system, T)
@@ -112,64 +104,37 @@ def solve(
     )
 
 
-_KEPT = 256  # cached shells per system: one for each set of locked positions and parameter values
+_KEPT = 256  # cached frames per system: one for each set of locked positions and parameter values
 Seed = Mapping[str, float] | Sequence[float] | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Shell:
-    """Data of a frame that `solve` reuses for all poses.
-
-    Attributes:
-        kernel: solver for single poses.
-        names: names of the coordinates of the system.
-        plain: options without a seed.
-    """
+class _PreparedFrame:
+    """Data of a frame that `solve` reuses for all poses: solver for single poses, and options."""
 
     kernel: PoseKernel
-    names: tuple[str, ...]
-    plain: SolveOptions
+    options: SolveOptions
 
     def solutions(self, T: Any, seed: Seed) -> Solutions | None:
         """Return the solutions of a regular pose, or None if `solve` must use other methods."""
-        kernel, wishes = self.kernel, self.plain
+        kernel, options = self.kernel, self.options
         draft = kernel.draft_of(T)
         if draft is None or not draft.certain or not len(draft.q):
             return None
         if seed is not None:
-            wishes = replace(wishes, near=_near(wishes.system, kernel.chain, seed), seeded=True)
-        q = np.empty((len(draft.q), len(self.names)))
-        q[:] = wishes.near
-        q[:, kernel.chain.indices] = draft.q
-        q, within = wishes.bounds.wound(q, wishes.near)
-        order = np.flatnonzero(within) if wishes.strict else np.arange(len(q))
-        if not len(order):
-            return None
-        if wishes.seeded:
-            order = order[np.argsort(np.linalg.norm(q[order] - wishes.near, axis=1), kind="stable")]
-        names = [kernel.labels[b] for b in draft.branch[order].tolist()]
-        rows = RegularSolutions(
-            q[order],
-            names,
-            draft.residual[order],
-            kernel.arm,
-            draft.q[order],
-            wishes.bounds,
-            wishes.near,
-            within[order],
-        )
-        system = wishes.system
-        return Solutions(system.name, self.names, rows, kernel.method, "", None, wishes.bounds)
+            near = _near(options.system, kernel.chain, seed)
+            options = replace(options, near=near, seeded=True)
+        return options.regular_solutions(draft, kernel.chain.indices, kernel.arm)
 
 
-def _shell_of(
+def _prepared_frame(
     system: System,
     frame: str | int | None,
     method: str,
     limits: bool | Given | None,
     locked: Mapping[str, float] | None,
     parameters: Mapping[str, float] | None,
-) -> _Shell | None:
+) -> _PreparedFrame | None:
     """Return the cached data of a frame, or None if only the slow methods apply."""
     # an argument that is no dict keeps its type in the key; its reader raises the error
     given = (
@@ -182,18 +147,17 @@ def _shell_of(
     except TypeError:  # unhashable arguments are not cached
         return None
 
-    def made() -> _Shell | None:
+    def made() -> _PreparedFrame | None:
         require_method(system, method, METHODS)
         p = np.array(system.parameter_values(parameters))
         chain = chain_or_none(system, frame, locked)
         kernel = None if chain is None or system.is_closed else kernel_of(chain, p, method)
         if chain is None or kernel is None:
             return None
-        names = tuple(coordinate.name for coordinate in system.coordinates)
-        return _Shell(kernel, names, _wishes(system, chain, limits, None))
+        return _PreparedFrame(kernel, _options_of(system, chain, limits, None))
 
-    shell: _Shell | None = system.recent("poses of a frame", key, made, _KEPT)
-    return shell
+    prepared: _PreparedFrame | None = system.recent("poses of a frame", key, made, _KEPT)
+    return prepared
 
 
 def solve_rigid(
@@ -225,11 +189,11 @@ def solve_rigid(
     samples = samples_of(system, locked, redundant, limits, 1)
     chain = chain_or_none(system, frame, samples.locked, samples.varied)
     if chain is None:
-        return parallel(_wishes(system, None, limits, seed), frame, target, p)
+        return parallel(_options_of(system, None, limits, seed), frame, target, p)
     if redundant is None:
         return solve_at(chain, samples.r[0, 0], target, method, p, limits, seed)
-    asked = [_asked(chain, r, target, method, p, limits, seed) for r in samples.r[0]]
-    return _joined(asked, samples, None if seed is None else np.array(system.position(seed)))
+    solved = [_solve_chain(chain, r, target, method, p, limits, seed) for r in samples.r[0]]
+    return _join_samples(solved, samples, None if seed is None else np.array(system.position(seed)))
 
 
 def solve_at(
@@ -252,14 +216,14 @@ def solve_at(
         limits: argument of `solve`.
         seed: argument of `solve`.
     """
-    return answer(*_asked(chain, r, T, method, p, limits, seed))
+    return answer(*_solve_chain(chain, r, T, method, p, limits, seed))
 
 
-_Asked = tuple[PoseProblem, list[ChainRoot], str]
+_ChainSolutions = tuple[PoseProblem, list[Solution], str]
 """Problem, solutions of its chain, and name of the method that computed them."""
 
 
-def _asked(
+def _solve_chain(
     chain: FrameChain,
     r: Array,
     T: Array,
@@ -267,76 +231,69 @@ def _asked(
     p: Array,
     limits: bool | Given | None,
     seed: Mapping[str, float] | Sequence[float] | None,
-) -> _Asked:
+) -> _ChainSolutions:
     require_method(chain.system, method, METHODS)
     own = chain.locked_at(r) if chain.varied else chain
-    wishes = _wishes(chain.system, own, limits, seed)
-    question = PoseProblem(own, Target(own.arm(p), T), p, wishes)
+    options = _options_of(chain.system, own, limits, seed)
+    problem = PoseProblem(own, Target(own.arm(p), T), p, options)
     if chain.varied:  # one closed form serves all positions
-        found, used = solved(question, method, chain, r)
-        return question, named(question, found, _signs(chain, method, p)), used
+        found, used = _distinct_solutions(problem, method, chain, r)
+        sequence = sequence_or_none(chain, method, p)
+        labels = branch_labels(chain, sequence, p) if sequence else ()
+        return problem, with_names(problem, found, labels), used
     kernel = kernel_of(chain, p, method)
     draft = None if kernel is None else kernel.draft(T)
     if kernel is not None and draft is not None and draft.certain:
-        labels = [kernel.labels[b] for b in draft.branch]
-        certain = [ChainRoot(q, name, 1) for q, name in zip(draft.q, labels, strict=True)]
-        return question, certain, kernel.method
-    found, used = solved(question, method, chain, r)
-    return question, named(question, found, kernel.labels if kernel else ()), used
+        certain = [Solution(q, name) for q, name in zip(draft.q, draft.labels, strict=True)]
+        return problem, certain, kernel.method
+    found, used = _distinct_solutions(problem, method, chain, r)
+    return problem, with_names(problem, found, kernel.labels if kernel else ()), used
 
 
-def _signs(chain: FrameChain, method: str, p: Array) -> tuple[str, ...]:
-    """Return the branch names of the closed form, empty without one."""
-    if method not in ("auto", *CLOSED_FORMS):
-        return ()
-    try:
-        return branch_labels(chain, sequence_of(chain, method, p), p)
-    except NoClosedForm:
-        return ()
-
-
-def solved(
-    question: PoseProblem, method: str, varied: FrameChain, r: Array
-) -> tuple[list[ChainRoot], str]:
+def _distinct_solutions(
+    problem: PoseProblem, method: str, varied: FrameChain, r: Array
+) -> tuple[list[Solution], str]:
     """Return the distinct solutions of a chain and the name of the method that computed them.
 
     Args:
-        question: chain and target pose.
+        problem: chain and target pose.
         method: argument of `solve`.
         varied: the same chain with symbolic positions of the varied joints.
-        r: (k,) positions of the varied joints in `question` [rad or m].
+        r: (k,) positions of the varied joints in `problem` [rad or m].
     """
-    chain, target, p = question.chain, question.target, question.p
-    gathered = gather(varied, target, method, p, r)
-    if method not in ("auto", *CLOSED_FORMS) or not _is_doubtful(target, gathered):
-        return roots(target, gathered, question.chain_indices), gathered.method
-    gathered = gather_further(chain, target, gathered, p)
+    chain, target, p = problem.chain, problem.target, problem.p
+    draft = pose_draft(varied, target, method, p, r)
+    if method not in ("auto", *CLOSED_FORMS) or not _is_doubtful(target, draft):
+        return verify(target, draft, problem.chain_indices), draft.method
+    draft = extend_draft(chain, target, draft, p)
     examined: Examined = {}
-    found = roots(target, gathered, question.chain_indices, examined)
+    found = verify(target, draft, problem.chain_indices, examined)
     for root in found:
         if root.family is not None and root.family.dimension == 1:
             samples = root.family.chain_samples / target.unit
-            gathered = joined(gathered, new_among(target, found, beside(target, samples)))
+            draft = join_drafts(draft, new_among(target, found, valley_draft(target, samples)))
     if any(root.family is not None for root in found):
-        found = roots(target, gathered, question.chain_indices, examined)
-    if gathered.method == "search":
-        return separated(target, found), gathered.method
+        found = verify(target, draft, problem.chain_indices, examined)
+    if draft.method == "search":
+        return merge_connected(target, found), draft.method
     # a search also finds points of known self-motions, which are dropped here
-    more = new_among(target, found, by_search(target))
+    more = new_among(target, found, search_draft(target))
     if len(more.q):
-        found = roots(target, joined(gathered, more), question.chain_indices, examined)
-    return separated(target, found), gathered.method
+        found = verify(target, join_drafts(draft, more), problem.chain_indices, examined)
+    return merge_connected(target, found), draft.method
 
 
-def _joined(asked: list[_Asked], samples: LockedSamples, near: Array | None) -> Solutions:
+def _join_samples(
+    solved: list[_ChainSolutions], samples: LockedSamples, near: Array | None
+) -> Solutions:
     """Join the solutions of all samples of redundant joints, sorted by distance from `near`.
 
     Without any solution: the reason at the sample that comes nearest to the pose.
     """
-    reached = [k for k, (_, found, _) in enumerate(asked) if found]
+    reached = [k for k, (_, found, _) in enumerate(solved) if found]
     if not reached:
-        reached = [int(np.argmin([_away(question) for question, _, _ in asked]))]
-    answers = [answer(*asked[k]) for k in reached]
+        reached = [int(np.argmin([_away(problem) for problem, _, _ in solved]))]
+    answers = [answer(*solved[k]) for k in reached]
     every = [solution for own in answers for solution in own]
     if near is not None:
         every.sort(key=lambda solution: float(np.linalg.norm(solution.q - near)))
@@ -344,14 +301,14 @@ def _joined(asked: list[_Asked], samples: LockedSamples, near: Array | None) -> 
         return replace(answers[0], solutions=tuple(every), reason="", nearest=None)
     position = zip(samples.varied, samples.r[0, reached[0]], strict=True)
     at = ", ".join(f"{name} = {x:.6g}" for name, x in position)
-    reason = f"none at {len(asked)} positions of redundant joints; at {at}: {answers[0].reason}"
+    reason = f"none at {len(solved)} positions of redundant joints; at {at}: {answers[0].reason}"
     return replace(answers[0], reason=reason)
 
 
-def _away(question: PoseProblem) -> float:
+def _away(problem: PoseProblem) -> float:
     """Return the distance of the nearest reachable pose: [arm lengths] plus [rad]."""
-    arm = question.target.arm
-    found = nearest(arm, question.target.T)
+    arm = problem.target.arm
+    found = nearest(arm, problem.target.T)
     return found.distance / arm.length + found.angle
 
 
@@ -372,14 +329,14 @@ def chain_or_none(
         return None
 
 
-def _is_doubtful(target: Target, gathered: Gathered) -> bool:
+def _is_doubtful(target: Target, draft: PoseDraft) -> bool:
     """Whether solutions may be missing: none was found, or one is nearly singular."""
-    if gathered.doubtful or not len(gathered.q):
+    if not draft.certain or not len(draft.q):
         return True
-    return bool(np.any(nearly_singular(target.arm, gathered.q)))
+    return bool(np.any(nearly_singular(target.arm, draft.q)))
 
 
-def _wishes(
+def _options_of(
     system: System,
     chain: FrameChain | None,
     limits: bool | Given | None,

@@ -3,40 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.model_function import require_system
 from mbs.closed_forms.arm import Arm, Array
-from mbs.closed_forms.sequence import StepSequence
-from mbs.errors import NoClosedForm
 from mbs.models.inverse_geometry._solve import solve_at, solve_rigid
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_poses
-from mbs.models.inverse_geometry.closed_form import (
-    CLOSED_FORMS,
-    require_method,
-    sequence_of,
-)
-from mbs.models.inverse_geometry.gathering import METHODS
-from mbs.models.inverse_geometry.many import (
+from mbs.models.inverse_geometry.closed_form import require_method
+from mbs.models.inverse_geometry.draft import METHODS
+from mbs.models.inverse_geometry.draft_many import (
     Booleans,
-    BranchSolutions,
-    draft_solutions,
-    general_draft,
-    general_draft_varied,
-    nothing,
-    ready,
-    with_configurations,
+    many_draft,
+    replace_solutions,
 )
 from mbs.models.inverse_geometry.redundancy import Locked, LockedSamples, Redundant, samples_of
 from mbs.models.inverse_geometry.solutions import (
     WITHIN,
     CoordinateLimits,
     Given,
+    ManySolutions,
     Solutions,
     bounds,
     leaves_out,
@@ -44,50 +33,6 @@ from mbs.models.inverse_geometry.solutions import (
 
 Repair = Callable[[Arm, Array], Array]
 """Function (arm, T (4, 4)) -> all configurations (m, n) of the arm with end pose T."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ManySolutions:
-    """Solutions of N poses: one row per pose, one column per branch.
-
-    With S positions of redundant joints, the columns of the first position are followed by the
-    columns of the second position, and so on. Use `q.reshape(N, S, -1, nq)` to separate them.
-
-    Attributes:
-        q: (N, S branches, nq) configurations [rad or m]; arbitrary finite values if not valid.
-        valid: (N, S branches) whether the column contains a solution.
-        residual: (N, S branches) largest absolute difference of an element between the pose of q
-            and the target, in m and 1; infinite in unused columns.
-        labels: names of the columns; empty texts without a closed form.
-        searched: (N,) whether the pose was solved individually at some position of redundant
-            joints. Its configurations are in the columns of the nearest branches.
-        undecided: (N,) whether double precision cannot decide the list of solutions at some
-            position of redundant joints; see `Solutions.undecided`.
-        samples: number S of positions of redundant joints, 1 without redundant joints.
-    """
-
-    q: Array
-    valid: Booleans
-    residual: Array
-    labels: tuple[str, ...]
-    searched: Booleans
-    undecided: Booleans
-    samples: int = 1
-
-    def __len__(self) -> int:
-        """Return the number of poses."""
-        return len(self.q)
-
-    @property
-    def count(self) -> NDArray[np.int64]:
-        """Number of solutions of each pose, (N,)."""
-        count: NDArray[np.int64] = np.sum(self.valid, axis=1, dtype=np.int64)
-        return count
-
-    def of(self, k: int) -> Array:
-        """Return the solutions (m, nq) of pose k, counted from 0 [rad or m]."""
-        configurations: Array = self.q[k, self.valid[k]]
-        return configurations
 
 
 def solve_many(
@@ -154,28 +99,26 @@ def solve_many(
             for at in own
         ]
         return _gather_samples(_stack(system, answers), samples)
-    robot = _robot(frame_chain(system, frame, samples.locked, samples.varied), method, p)
+    chain = frame_chain(system, frame, samples.locked, samples.varied)
     count, number, joints = samples.r.shape
     r = samples.r.reshape(count * number, joints)
     many = poses if number == 1 else np.repeat(poses, number, axis=0)
-    draft = robot.draft(many, r)
-    undecided = np.zeros(len(many), dtype=bool)
+    draft = many_draft(chain, method, p, many, r)
     for k in np.flatnonzero(draft.searched):
-        chain, pose = robot.chain.locked_at(r[k]), many[k]
-        arm = chain.arm(p)
+        pose, arm = many[k], chain.locked_at(r[k]).arm(p)
         if repair:
             q = repair(arm, pose)
         else:
-            q, undecided[k] = robot.solved(pose, r[k])
-        draft = with_configurations(draft, int(k), arm, q, pose)
-    q, valid = robot.whole(draft.q, r), draft.valid
+            found = solve_at(chain, r[k], pose, method, p)
+            q, draft.undecided[k] = found.q[:, list(chain.indices)], found.undecided
+        draft = replace_solutions(draft, int(k), arm, q, pose)
+    q, valid = _whole(chain, draft.q, r), draft.valid
     if leaves_out(limits):
-        names, indices = list(redundant or {}), list(robot.chain.indices)
+        names, indices = list(redundant or {}), list(chain.indices)
         indices += [k for k, c in enumerate(system.coordinates) if c.name in names]
         q, within = _unwind(bounds(system, limits, indices), q)
         valid = valid & within
-    found = ManySolutions(q, valid, draft.residual, draft.labels, draft.searched, undecided)
-    return _gather_samples(found, samples)
+    return _gather_samples(replace(draft, q=q, valid=valid), samples)
 
 
 def _gather_samples(many: ManySolutions, samples: LockedSamples) -> ManySolutions:
@@ -196,58 +139,16 @@ def _gather_samples(many: ManySolutions, samples: LockedSamples) -> ManySolution
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Robot:
-    """Chain, parameter values and method of a robot; `sequence` is None without a closed form."""
-
-    chain: FrameChain
-    p: Array
-    method: str
-    sequence: StepSequence | None
-
-    def draft(self, T: Array, r: Array) -> BranchSolutions:
-        """Solve poses T (N, 4, 4) by the closed form, else by the general method."""
-        if self.sequence is not None:
-            return draft_solutions(self.chain, self.sequence, self.p, T, r)
-        if self.method in ("auto", "general"):
-            if self.chain.varied:
-                return general_draft_varied(self.chain, self.p, T, r)
-            general = ready(self.chain, self.p)
-            if general is not None:
-                return general_draft(general, T)
-        return nothing(len(self.chain.names), len(T))
-
-    def solved(self, pose: Array, r: Array) -> tuple[Array, bool]:
-        """Solve one pose with varied joints at r (k,): chain positions (m, n), undecided flag."""
-        found = solve_at(self.chain, r, pose, self.method, self.p)
-        return found.q[:, list(self.chain.indices)], found.undecided
-
-    def whole(self, q: Array, r: Array) -> Array:
-        """Return the positions (N, branches, nq) of all joints; others as assembled or locked."""
-        system = self.chain.system
-        if self.chain.indices == tuple(range(system.nq)):
-            return q
-        every = np.empty((*q.shape[:2], system.nq))
-        every[...] = system.position(self.chain.locked)
-        every[..., list(self.chain.indices)] = q
-        every[..., list(self.chain.varied_indices)] = r[:, None]
-        return every
-
-
-def _robot(chain: FrameChain, method: str, p: Array) -> _Robot:
-    return _Robot(chain, p, method, _sequence(chain, method, p))
-
-
-def _sequence(chain: FrameChain, method: str, p: Array) -> StepSequence | None:
-    """Return the requested closed form, or None if there is none or the method is another."""
-    if method not in (*CLOSED_FORMS, "auto"):
-        return None
-    try:
-        return sequence_of(chain, method, p)
-    except NoClosedForm:
-        if method != "auto":
-            raise
-        return None
+def _whole(chain: FrameChain, q: Array, r: Array) -> Array:
+    """Return the positions (N, branches, nq) of all joints; others as assembled or locked."""
+    system = chain.system
+    if chain.indices == tuple(range(system.nq)):
+        return q
+    every = np.empty((*q.shape[:2], system.nq))
+    every[...] = system.position(chain.locked)
+    every[..., list(chain.indices)] = q
+    every[..., list(chain.varied_indices)] = r[:, None]
+    return every
 
 
 def _stack(system: System, answers: list[Solutions]) -> ManySolutions:

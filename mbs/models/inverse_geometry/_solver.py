@@ -16,12 +16,12 @@ from mbs.closed_forms.arm_search import Nearest
 from mbs.models.inverse_geometry._solve import chain_or_none, solve_rigid
 from mbs.models.inverse_geometry.chain import target_pose
 from mbs.models.inverse_geometry.closed_form import require_method
-from mbs.models.inverse_geometry.gathering import METHODS
-from mbs.models.inverse_geometry.kernel import CERTAIN, PoseKernel, kernel_of
-from mbs.models.inverse_geometry.solutions import Solutions
+from mbs.models.inverse_geometry.draft import METHODS
+from mbs.models.inverse_geometry.draft_compiled import CERTAIN, PoseKernel, kernel_of
+from mbs.models.inverse_geometry.solutions import PoseDraft, Solutions
 
 
-class PoseAnswer:
+class PoseAnswer(PoseDraft):
     """All configurations for one pose.
 
     Attributes:
@@ -32,37 +32,28 @@ class PoseAnswer:
             multiplicities and self-motions.
     """
 
-    __slots__ = ("_T", "_branch", "_labels", "_solutions", "_solver", "q", "residual", "singular")
-
-    q: Array
-    residual: Array
-    singular: bool
+    __slots__ = ("_T", "_solutions", "_solver")
 
     def __init__(
         self,
         q: Array,
         residual: Array,
-        labels: Mapping[int, str] | tuple[str, ...],
+        names: Mapping[int, str] | tuple[str, ...],
         branch: Any,
         solver: PoseSolver,
         T: Any,
         solutions: Solutions | None,
     ) -> None:
         """Store the results of a `PoseSolver`."""
-        self.q, self.residual, self.singular = q, residual, solutions is not None
-        self._labels, self._branch, self._solver, self._T = labels, branch, solver, T
+        self.q, self.residual, self.certain = q, residual, solutions is None
+        self.method, self.near = solver.used, None
+        self._names, self._branch, self._solver, self._T = names, branch, solver, T
         self._solutions = solutions
 
-    def __len__(self) -> int:
-        """Return the number of configurations."""
-        return len(self.q)
-
     @property
-    def labels(self) -> tuple[str, ...]:
-        """Name of the branch of each configuration."""
-        if self._branch is None:
-            return tuple(self._labels)  # type: ignore[arg-type]
-        return tuple([self._labels[b] for b in self._branch.tolist()])
+    def singular(self) -> bool:
+        """Whether `solve` computed the configurations; see the class."""
+        return not self.certain
 
     @property
     def solutions(self) -> Solutions:
@@ -128,8 +119,7 @@ class PoseSolver(MadeOnce):
         self.used = self._kernel.method if self._kernel else "search"
         closed_form = self._kernel is not None and self.used != "general"
         self.labels = self._kernel.labels if self._kernel and closed_form else ()
-        # branch indices are returned as doubles, which are equal to integers as keys
-        self._names = dict(enumerate(self._kernel.labels)) if self._kernel else {}
+        self._names = self._kernel.names if self._kernel else {}
         code = self._kernel.code() if self._kernel else None
         self._call = code.call if code else _decline
         self._data = code.solver if code else None
@@ -169,7 +159,7 @@ class PoseSolver(MadeOnce):
         q = np.empty((len(draft.q), self.system.nq))
         q[:] = self.system.position(self._kernel.chain.locked)
         q[:, list(self._kernel.chain.indices)] = draft.q
-        return PoseAnswer(q, draft.residual, self._names, draft.branch, self, T, None)
+        return PoseAnswer(q, draft.residual, draft.labels, None, self, T, None)
 
     def solutions(self, T: Any) -> Solutions:
         """Return the result of `solve` for a pose T (4, 4) [m]."""

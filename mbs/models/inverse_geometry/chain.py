@@ -26,7 +26,10 @@ from mbs.spatial import Pose
 from mbs.text import did_you_mean, quoted
 
 _SAMPLES, _SEED = 4, 20260105
+"""Random configurations at which a property of the structure is examined: one shows it with
+probability one, the others exclude a coincidence within rounding. Seed of the random numbers."""
 _LARGEST = 6
+"""Number of joints that a pose determines: the freedoms of a rigid body."""
 _KEPT = 1024
 """Maximum number of cached chains and arms: one per position of locked joints."""
 

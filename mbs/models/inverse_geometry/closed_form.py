@@ -17,6 +17,7 @@ from mbs.assembly.model_function import ModelFunction, Named, model_function
 from mbs.closed_forms.sequence import Leaf, Problem, StepSequence
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.chain import FrameChain
+from mbs.models.inverse_geometry.target import NEARLY_SINGULAR, SINGULAR
 from mbs.numbers import NONZERO
 from mbs.operations.counts import count
 from mbs.operations.graph import Graph, Node, function_of, graph_of
@@ -35,6 +36,7 @@ Numbers: TypeAlias = NDArray[np.float64] | None
 """Parameter values (np,), or None to keep parameters symbolic."""
 
 _FEW = 8
+"""Number of branches of an arm with a spherical wrist, which no method can reduce."""
 
 
 def sequence_of(chain: FrameChain, method: str = "auto", p: Numbers = None) -> StepSequence:
@@ -72,6 +74,22 @@ def sequence_of(chain: FrameChain, method: str = "auto", p: Numbers = None) -> S
             " mbs.models.inverse_geometry.solve, which needs none"
         )
     return found[0] if len(found) == 1 else min(found, key=lambda steps: _price(chain, steps, p))
+
+
+def sequence_or_none(chain: FrameChain, method: str, p: Numbers) -> StepSequence | None:
+    """Return the closed form of a chain, or None if it has none or the method is another.
+
+    Raises:
+        NoClosedForm: method is "pieper" or "paul" and does not apply to the chain.
+    """
+    if method not in (*CLOSED_FORMS, "auto"):
+        return None
+    try:
+        return sequence_of(chain, method, p)
+    except NoClosedForm:
+        if method != "auto":
+            raise
+        return None
 
 
 def require_method(system: System, method: str, known: tuple[str, ...]) -> None:
@@ -142,6 +160,32 @@ def _price(chain: FrameChain, sequence: StepSequence, p: Numbers) -> tuple[int, 
 
     operations: int = chain.system.cached(("operations", sequence), counted)
     return sequence.branches, operations
+
+
+def closed_form_name(chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64]) -> str:
+    """Return the name of the closed form of a sequence: "pieper" or "paul"."""
+    try:
+        return "pieper" if sequence is sequence_of(chain, "pieper", p) else "paul"
+    except NoClosedForm:
+        return "paul"
+
+
+_SUSPECT = 1e-9
+"""Radicands and regularity (squared, dimensionless) above which the two roots of an equation are
+farther apart than 1e-5, for any singular value."""
+
+
+def bounds_of(sequence: StepSequence) -> tuple[float, float]:
+    """Return the bounds of the test for missing solutions near singular configurations.
+
+    Returns:
+        Value of `real` and `regular` above which the Jacobian is not checked, and singular value
+        below which solutions may be missing. Equations with two roots lose no solution until the
+        roots count as one. Quartics lose solutions as the general method does.
+    """
+    if any(step.kind == "quartic" for step in sequence.steps):
+        return np.inf, NEARLY_SINGULAR
+    return _SUSPECT, SINGULAR
 
 
 # Characteristic matrix of the general method as a Function of the pose.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi
 import numpy as np
@@ -17,13 +17,6 @@ from mbs.closed_forms.sequence import Leaf, SequenceStep, StepSequence
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.branches import branch_labels
 from mbs.models.inverse_geometry.chain import FrameChain, frame_chain, target_pose, target_poses
-from mbs.models.inverse_geometry.gathering import ILL_CONDITIONED, general_ready
-from mbs.models.inverse_geometry.many import draft_solutions
-from mbs.models.inverse_geometry.target import NEARLY_SINGULAR
-from mbs.text import joint_label, quoted
-
-if TYPE_CHECKING:
-    pass
 from mbs.models.inverse_geometry.closed_form import (
     CLOSED_FORMS,
     all_branches,
@@ -37,6 +30,10 @@ from mbs.models.inverse_geometry.closed_form import (
     size,
     whole_configuration,
 )
+from mbs.models.inverse_geometry.draft import regular_general
+from mbs.models.inverse_geometry.draft_many import closed_form_draft
+from mbs.models.inverse_geometry.target import NEARLY_SINGULAR
+from mbs.text import joint_label, quoted
 
 METHODS = ("auto", *CLOSED_FORMS, "general")
 
@@ -130,7 +127,7 @@ class AllBranches(InverseGeometry):
         one = np.ndim(T) == 2
         poses = target_poses(self.system, [T] if one else T)
         p, none = np.array(self.system.parameter_values(parameters)), np.zeros((len(poses), 0))
-        found = ~draft_solutions(self._chain, self._sequence, p, poses, none).searched
+        found = ~closed_form_draft(self._chain, self._sequence, p, poses, none).searched
         return bool(found[0]) if one else found
 
 
@@ -312,8 +309,8 @@ def all_configurations(chain: FrameChain) -> AllConfigurations:
         )
 
     def make() -> AllConfigurations:
-        ready = general_ready(chain, np.zeros(0))
-        if ready is None or ready.prepared.regularity < ILL_CONDITIONED:
+        ready = regular_general(chain, np.zeros(0))
+        if ready is None:
             raise NoClosedForm(
                 f"{system.name}: the general method does not hold for {', '.join(chain.names)}, it"
                 " is for six joints of which one turns, in a regular arrangement; use"

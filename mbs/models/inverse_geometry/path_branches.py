@@ -15,12 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Arm, Array
-from mbs.errors import NoClosedForm
-from mbs.models.inverse_geometry.closed_form import sequence_of
-from mbs.models.inverse_geometry.many import batch
+from mbs.models.inverse_geometry.closed_form import sequence_or_none
+from mbs.models.inverse_geometry.draft_many import evaluate_branches
 from mbs.models.inverse_geometry.path_equations import (
     LARGEST_STEP,
-    Follower,
+    PathJoints,
 )
 from mbs.models.inverse_geometry.path_poses import Path
 from mbs.models.inverse_geometry.solutions import WITHIN
@@ -87,13 +86,13 @@ class BranchBlock:
         certain[:-1] &= even[1:]
         q, move, certain = q[row - first :], move[row - first :], certain[row - first :]
         count = int(np.argmin(certain)) if not np.all(certain) else len(certain)
-        led = x + np.cumsum(move[:count], axis=0)
-        turns = np.where(self.arm.prismatic, 0.0, np.round((led - q[1 : count + 1]) / _TURN))
-        led = q[1 : count + 1] + _TURN * turns
+        unwrapped = x + np.cumsum(move[:count], axis=0)
+        turns = np.where(self.arm.prismatic, 0.0, np.round((unwrapped - q[1 : count + 1]) / _TURN))
+        unwrapped = q[1 : count + 1] + _TURN * turns
         low, high = self.limits
-        within = np.all((led >= low - WITHIN) & (led <= high + WITHIN), axis=1)
+        within = np.all((unwrapped >= low - WITHIN) & (unwrapped <= high + WITHIN), axis=1)
         count = count if np.all(within) else int(np.argmin(within))
-        return led[:count], self.residual[row + 1 : row + 1 + count, branch]
+        return unwrapped[:count], self.residual[row + 1 : row + 1 + count, branch]
 
     def nearest(self, number: int, x: Array) -> tuple[Array, float] | None:
         """Return the solution at pose `number` that is much nearer to x (n,) than all others.
@@ -115,12 +114,12 @@ class BranchBlock:
         return x + away[best], float(self.residual[row, branches[best]])
 
 
-def _no_poses(joints: int) -> tuple[Array, Array]:
-    return np.empty((0, joints)), np.empty(0)
+def _no_poses(size: int) -> tuple[Array, Array]:
+    return np.empty((0, size)), np.empty(0)
 
 
 def branch_block(
-    led: Follower, poses: Path, number: int, known: BranchBlock | None
+    joints: PathJoints, poses: Path, number: int, known: BranchBlock | None
 ) -> BranchBlock | None:
     """Return the branches at a block of poses from index `number`, or None.
 
@@ -129,19 +128,20 @@ def branch_block(
     if known is not None and known.first <= number < known.first + len(known.q) - 1:
         return known
     last = number == poses.count - 1
-    if led.chain is None or led.redundant or last:
+    if joints.chain is None or joints.redundant or last:
         return None
     if poses.count < _SHORT and known is None:
         return None
-    p = led.target.closing.p
-    try:
-        sequence = sequence_of(led.chain, "auto", p)
-    except NoClosedForm:
+    p = joints.target.closing.p
+    sequence = sequence_or_none(joints.chain, "auto", p)
+    if sequence is None:
         return None
     T = poses.poses[number : number + _BLOCK]
-    every = batch(led.chain, sequence, p, T, np.zeros((len(T), 0)))
-    arm = led.chain.arm(p)
+    every = evaluate_branches(joints.chain, sequence, p, T, np.zeros((len(T), 0)))
+    arm = joints.chain.arm(p)
     good = every.residual <= SOLVED * max(1.0, arm.length)
     size = np.minimum(every.real, every.regular)
     good &= size > 0
-    return BranchBlock(number, every.q / led.scale, every.residual, good, size, arm, led.limits)
+    return BranchBlock(
+        number, every.q / joints.scale, every.residual, good, size, arm, (joints.low, joints.high)
+    )

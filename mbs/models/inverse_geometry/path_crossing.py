@@ -19,18 +19,24 @@ from collections.abc import Sequence
 import numpy as np
 
 from mbs.closed_forms.arm import Array, gap_to
-from mbs.models.inverse_geometry.path_correction import correct, nearby_solution, nearest_solution
 from mbs.models.inverse_geometry.path_equations import (
     AT_POSE,
     POSE_ERROR,
-    Follower,
+    PathJoints,
     PathPoint,
     smallest,
 )
 from mbs.models.inverse_geometry.path_poses import curve_segment, moved, straight
-from mbs.models.inverse_geometry.path_prediction import FAIR, lagrange, relative_correction
 from mbs.models.inverse_geometry.path_state import PathState, SingularityCrossing
-from mbs.models.inverse_geometry.path_steps import advance
+from mbs.models.inverse_geometry.path_steps import (
+    FAIR,
+    advance,
+    correct,
+    lagrange,
+    nearby_solution,
+    nearest_solution,
+    relative_correction,
+)
 
 _NEAREST = 1e-4
 """Smallest distance from a singular configuration, as a fraction of the segment between two poses:
@@ -66,16 +72,16 @@ def singularity_crossing(state: PathState, stopped: bool) -> SingularityCrossing
         stopped: whether the continuation stopped before the next pose.
     """
     near = state.trail[-1][1]
-    if stopped and smallest(state.tracker, near.J) > _WATCHED:
+    if stopped and smallest(state.joints, near.J) > _WATCHED:
         return None
-    if state.poses.function is None and state.led.chain is not None:
+    if state.poses.function is None and state.joints.chain is not None:
         between = _crossing_between_poses(state, stopped)
         if between is not None:
             return between
     if stopped:
         return _crossing_along_curve(state, state.trail, _NEAREST)
-    if state.led.redundant and state.poses.function is not None:
-        singular = [smallest(state.tracker, point.J) for _, point in state.trail]
+    if state.joints.redundant and state.poses.function is not None:
+        singular = [smallest(state.joints, point.J) for _, point in state.trail]
         trail = state.trail[: int(np.argmin(singular)) + 1]
         return _crossing_along_curve(state, trail, _LEAST_DISTANCE)
     return None
@@ -91,7 +97,7 @@ def _crossing_along_curve(
         trail: configurations up to the singular configuration.
         least: smallest distance to either side, in segments between poses.
     """
-    tracker, poses, number = state.tracker, state.poses, state.number
+    joints, poses, number = state.joints, state.poses, state.number
     at, end = trail[-1][0], float(poses.count - 1)
     # straight lines between poses have corners at the poses
     start = max(trail[0][0], number - 1.0 if poses.function is None else min(0.0, at - 1.0))
@@ -104,15 +110,15 @@ def _crossing_along_curve(
         to = min(at + way, end)
         predicted = lagrange(nodes, np.array(x), to)
         if to - at < _NEAREST:  # the path ends at the singular configuration
-            behind = nearby_solution(state.led, predicted, poses.poses[-1])
+            behind = nearby_solution(state.joints, predicted, poses.poses[-1])
         else:
-            corrected = correct(tracker, predicted, state.curve(to))
+            corrected = correct(joints, predicted, state.curve(to))
             behind = None if corrected is None else corrected.x
         ratio = np.inf
-        if behind is not None and tracker.may(behind):
+        if behind is not None and joints.may(behind):
             ratio = relative_correction(predicted, behind, np.asarray(x[-1]))
         smooth = ratio < FAIR and ratio < max(_LITTLE, _SMOOTH * before)
-        if behind is not None and smooth and _goes_across(state.led, np.asarray(x[-1]), behind):
+        if behind is not None and smooth and _goes_across(state.joints, np.asarray(x[-1]), behind):
             numbers = range(number, math.floor(to) + 1)
             passed = _passed_poses(state, [*nodes, to], np.array([*x, behind]), numbers)
             return None if passed is None else SingularityCrossing(passed, to, behind)
@@ -131,7 +137,7 @@ def _configuration_at(
     if at == u:
         return point.x
     segment = curve_segment(state.curve, at, u)
-    last, reached, _ = advance(state.tracker, point, segment, 1.0, curved=True)
+    last, reached, _ = advance(state.joints, point, segment, 1.0, curved=True)
     return last.x if reached == 1.0 else None
 
 
@@ -143,7 +149,7 @@ def _crossing_between_poses(state: PathState, stopped: bool) -> SingularityCross
     # the next pose may be the singular one itself
     beyond = number + 1
     ends = [beyond if stopped and number - state.trail[-1][0] < AT_POSE else number]
-    if state.led.redundant and ends[0] < beyond < state.poses.count:
+    if state.joints.redundant and ends[0] < beyond < state.poses.count:
         ends.append(beyond)
     crossings = (_crossing_to(state, *before, to) for to in ends)
     return next((crossing for crossing in crossings if crossing is not None), None)
@@ -153,15 +159,15 @@ def _crossing_to(
     state: PathState, nodes: list[float], x: Array, to: int
 ) -> SingularityCrossing | None:
     """Cross from configurations x (k, n) at pose indices `nodes` to the pose `to`, or None."""
-    led, poses, number, may = state.led, state.poses, state.number, state.tracker.may
+    joints, poses, number, may = state.joints, state.poses, state.number, state.joints.may
     predicted = lagrange(nodes, x, float(min(to, poses.count - 1)))
     if to >= poses.count:  # the path ends at the singular configuration
-        last = nearby_solution(led, predicted, poses.poses[-1])
+        last = nearby_solution(joints, predicted, poses.poses[-1])
         if last is None or relative_correction(predicted, last, x[-1]) > FAIR or not may(last):
             return None
         return SingularityCrossing(last[None], number, last)
     behind = _smooth_solution(state, predicted, to, x[-1])
-    if behind is None or not may(behind) or not _goes_across(led, x[-1], behind):
+    if behind is None or not may(behind) or not _goes_across(joints, x[-1], behind):
         return None
     nodes, x = [*nodes[-2:], float(to)], np.vstack([x[-2:], behind])
     beyond = None
@@ -191,8 +197,8 @@ def _points_before(state: PathState) -> tuple[list[float], Array] | None:
 
 def _smooth_solution(state: PathState, predicted: Array, number: int, last: Array) -> Array | None:
     """Return the solution (n,) at a pose nearest to the prediction, or None if too far."""
-    found = nearest_solution(state.led, predicted, state.poses.poses[number])
-    most = FAIR if state.led.redundant else _HALF
+    found = nearest_solution(state.joints, predicted, state.poses.poses[number])
+    most = FAIR if state.joints.redundant else _HALF
     return None if found is None or relative_correction(predicted, found, last) > most else found
 
 
@@ -207,8 +213,8 @@ def _passed_poses(
     for k in numbers:
         own = [y for u, y in zip(nodes, x, strict=True) if u == k]
         T, predicted = state.poses.poses[k], lagrange(nodes, x, float(k))
-        y = own[0] if own else nearby_solution(state.led, predicted, T)
-        if y is None or not state.tracker.may(y):
+        y = own[0] if own else nearby_solution(state.joints, predicted, T)
+        if y is None or not state.joints.may(y):
             return None
         passed.append(y)
     return np.array(passed).reshape(len(passed), x.shape[1])
@@ -223,31 +229,35 @@ def is_fair(state: PathState, nodes: Sequence[float], x: Array, to: int) -> bool
         x: (k, n) configurations at the nodes.
         to: index of the pose at the end of the interval.
     """
-    led, poses, before = state.led, state.poses.poses, state.number - 1
+    joints, poses, before = state.joints, state.poses.poses, state.number - 1
     T, middle = poses[before], (before + to) / 2
     rows = np.array([gap_to(state.curve(u), T) for u in nodes])
     middle_pose = moved(T, lagrange(nodes, rows, middle))
     if to > state.number:
         middle_pose = poses[state.number]
     line = straight(T, poses[to])(0.5)
-    units = np.array([led.length] * 3 + [1.0] * 3)
+    units = np.array([joints.length] * 3 + [1.0] * 3)
     chord = float(np.max(np.abs(gap_to(line, middle_pose) / units)))
-    gap = float(np.max(np.abs(led.rows(lagrange(nodes, x, middle), middle_pose)[0])))
+    gap = float(np.max(np.abs(joints.rows(lagrange(nodes, x, middle), middle_pose)[0])))
     return gap <= _UNCERTAIN * chord + POSE_ERROR
 
 
-def _goes_across(led: Follower, before: Array, behind: Array) -> bool:
+def _goes_across(joints: PathJoints, before: Array, behind: Array) -> bool:
     """Whether two configurations are on opposite sides of a singularity; True if not redundant.
 
     On opposite sides the null space of the Jacobian is nearly equal, and det([J; null space]) has
     opposite signs. Redundant joints that turn aside near a singularity stay on one side.
     """
-    if not led.redundant:
+    if not joints.redundant:
         return True
     T = np.eye(4)  # the Jacobian does not depend on the target
-    (_, J), (_, K), kept = led.rows(before, T), led.rows(behind, T), before.size - led.slack
+    (_, J), (_, K), kept = (
+        joints.rows(before, T),
+        joints.rows(behind, T),
+        before.size - joints.slack,
+    )
     still = np.linalg.svd(J)[2][kept:]
-    alike = np.linalg.svd(still @ np.linalg.svd(K)[2][kept:].T)[1][led.redundant - 1] > _ALIKE
+    alike = np.linalg.svd(still @ np.linalg.svd(K)[2][kept:].T)[1][joints.redundant - 1] > _ALIKE
     if len(J) != kept:  # closed loops have linearly dependent rows
         return bool(alike)
     signs = [np.linalg.slogdet(np.vstack([rows, still]))[0] for rows in (J, K)]

@@ -10,9 +10,8 @@ import numpy as np
 from mbs.closed_forms.arm import Array
 from mbs.models.inverse_geometry.path_branches import BranchBlock
 from mbs.models.inverse_geometry.path_equations import (
-    Follower,
+    PathJoints,
     PathPoint,
-    Tracker,
     point_at,
 )
 from mbs.models.inverse_geometry.path_poses import Path
@@ -42,8 +41,7 @@ class PathState:
     """State of the tracking of a path. `path_state` creates it at the start.
 
     Attributes:
-        led: joints that track the path.
-        tracker: equations and limits of `led`.
+        joints: joints that track the path.
         poses: path.
         curve: pose as a function of the real pose index u, -1 at the start.
         start: (nq,) configuration at u = -1.
@@ -57,8 +55,7 @@ class PathState:
         block: branches of the closed form at the current block of poses, or None.
     """
 
-    led: Follower
-    tracker: Tracker
+    joints: PathJoints
     poses: Path
     curve: Callable[[float], Array]
     start: Array
@@ -82,27 +79,25 @@ class PathState:
         """Return the last three reached poses as a trail."""
         numbers = range(max(0, self.number - 3), self.number)
         found, T = self.found, self.poses.poses
-        return [(float(k), point_at(self.tracker, found[k], T[k])) for k in numbers]
+        return [(float(k), point_at(self.joints, found[k], T[k])) for k in numbers]
 
     def land(self, crossing: SingularityCrossing) -> None:
         """Store the configurations of a crossing and move to its end."""
         passed = slice(self.number, self.number + len(crossing.x))
         self.found[passed] = crossing.x
         self.residual[passed] = [
-            self.led.residual(self.led.whole(self.start, x), T)
+            self.joints.residual(self.joints.whole(self.start, x), T)
             for x, T in zip(crossing.x, self.poses.poses[passed], strict=True)
         ]
         self.number, self.u, self.step = self.number + len(crossing.x), crossing.u, _AFTER_CROSSING
-        self.point = point_at(self.tracker, crossing.end, self.curve(self.u))
+        self.point = point_at(self.joints, crossing.end, self.curve(self.u))
         at_pose = self.u == self.number - 1
         self.trail = self.last_poses() if at_pose else [(self.u, self.point)]
 
 
-def path_state(led: Follower, poses: Path, q: Array) -> PathState:
+def path_state(joints: PathJoints, poses: Path, q: Array) -> PathState:
     """Return the initial tracking state at a configuration q (nq,), before the first pose."""
-    tracker, x, curve = led.tracker, led.scaled(q), poses.curve(led.pose(q))
-    point = point_at(tracker, x, curve(-1.0))
+    x, curve = joints.scaled(q), poses.curve(joints.pose(q))
+    point = point_at(joints, x, curve(-1.0))
     found, residual = np.empty((poses.count, x.size)), np.empty(poses.count)
-    return PathState(
-        led, tracker, poses, curve, q, found, residual, 0, -1.0, point, [(-1.0, point)]
-    )
+    return PathState(joints, poses, curve, q, found, residual, 0, -1.0, point, [(-1.0, point)])

@@ -14,9 +14,8 @@ from mbs.models.inverse_geometry.path_equations import (
     smallest,
 )
 from mbs.models.inverse_geometry.path_poses import curve_segment
-from mbs.models.inverse_geometry.path_prediction import FAIR, lagrange, relative_correction
 from mbs.models.inverse_geometry.path_state import PathState
-from mbs.models.inverse_geometry.path_steps import advance
+from mbs.models.inverse_geometry.path_steps import FAIR, advance, lagrange, relative_correction
 from mbs.models.inverse_geometry.path_stop import stop_reason
 
 _TRAIL = 40
@@ -49,21 +48,21 @@ def track(state: PathState) -> str:
 
 def _stays(state: PathState) -> bool:
     """Keep a singular configuration if the next pose is equal; return whether it is."""
-    if smallest(state.tracker, state.point.J) > SINGULAR:
+    if smallest(state.joints, state.point.J) > SINGULAR:
         return False
     way, x = state.number - state.u, state.point.x
     for part in _PARTS:
-        rows = state.tracker.rows(x, state.curve(state.u + part * way))[0]
+        rows = state.joints.rows(x, state.curve(state.u + part * way))[0]
         if np.max(np.abs(rows), initial=0.0) > POSE_ERROR:
             return False
-    q = state.led.whole(state.start, x)
-    state.arrive(x[None], [state.led.residual(q, state.poses.poses[state.number])])
+    q = state.joints.whole(state.start, x)
+    state.arrive(x[None], [state.joints.residual(q, state.poses.poses[state.number])])
     return True
 
 
 def _follow_branch(state: PathState) -> bool:
     """Advance over poses on one branch of the closed form; return whether there are any."""
-    state.block = branch_block(state.led, state.poses, state.number - 1, state.block)
+    state.block = branch_block(state.joints, state.poses, state.number - 1, state.block)
     if state.block is None:
         return False
     run, missed = state.block.after(state.number - 1, state.point.x)
@@ -83,7 +82,7 @@ def _smooth_step(state: PathState) -> bool:
     if (
         own is None
         or relative_correction(predicted, own[0], x[-1]) > FAIR
-        or not state.tracker.may(own[0])
+        or not state.joints.may(own[0])
     ):
         return False
     nodes, x = [*nodes[1:], float(number)], np.vstack([x[1:], own[0]])
@@ -99,13 +98,13 @@ def _smooth_step(state: PathState) -> bool:
 
 def _step_on(state: PathState) -> str:
     """Step to the next pose or past a singularity. Return the reason of a stop, or ""."""
-    led, number, way = state.led, state.number, list[tuple[float, PathPoint]]()
-    allowed = not led.redundant or state.tracker.may(state.point.x)
+    joints, number, way = state.joints, state.number, list[tuple[float, PathPoint]]()
+    allowed = not joints.redundant or state.joints.may(state.point.x)
     segment = curve_segment(state.curve, state.u, number)
     last, at = state.point, 0.0
     if allowed:
         curved, first = state.poses.function is not None, min(1.0, state.step)
-        last, at, state.step = advance(state.tracker, state.point, segment, first, way, curved)
+        last, at, state.step = advance(state.joints, state.point, segment, first, way, curved)
     u, way_left = state.u, number - state.u
     state.trail = state.trail[-_TRAIL:] + [(u + s * way_left, passed) for s, passed in way]
     state.u = float(number) if at == 1.0 else u + at * way_left
@@ -118,11 +117,11 @@ def _step_on(state: PathState) -> str:
         state.land(crossing)
         return ""
     state.point = last
-    q = led.whole(state.start, last.x)
+    q = joints.whole(state.start, last.x)
     if stopped:
-        return stop_reason(led, state.poses, number, q, state.u - number + 1)
+        return stop_reason(joints, state.poses, number, q, state.u - number + 1)
     state.found[number] = last.x
-    state.residual[number] = led.residual(q, state.poses.poses[number])
+    state.residual[number] = joints.residual(q, state.poses.poses[number])
     state.number += 1
     return ""
 
@@ -139,4 +138,4 @@ def _turns_off(state: PathState, point: PathPoint) -> bool:
     if float(np.linalg.norm(point.x - predicted)) <= max(_TURN_OFF * before, SMALL):
         return False
     longest = max(before, float(np.linalg.norm(point.x - known[-1])))
-    return smallest(state.tracker, point.J) < _NEAR_STEPS * longest
+    return smallest(state.joints, point.J) < _NEAR_STEPS * longest

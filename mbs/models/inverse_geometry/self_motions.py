@@ -12,27 +12,26 @@ from numpy.typing import NDArray
 import mbs.closed_forms.arm_core as core
 from mbs.closed_forms.arm import Array
 from mbs.errors import ModelError
-from mbs.models.inverse_geometry.target import Target, TargetReduction
+from mbs.models.inverse_geometry.target import SINGULAR_ERROR, Target, TargetReduction
 from mbs.numbers import NONZERO
 
 # Detection of a self-motion at a singular solution, and the curve of its configurations.
 
 
-_STEP, _SMALLEST_STEP = 0.1, 1e-5
-"""Largest and smallest step along a self-motion [rad or arm lengths]. 63 largest steps make one
-revolution. A curve ends if the smallest step fails, and nearer curves are crossed."""
-_STRAIGHT = 0.9
-"""Cosine of the largest angle between steps, 26 degrees: curves rarely cross at a smaller angle."""
+_STEP = 0.1
+"""Largest step along a self-motion [rad or arm lengths]: 63 steps make one revolution. The tracing
+itself, with its other limits, is `arm_descend.c` of the run-time library."""
 _MOST_STEPS, _FEW_STEPS = 2000, 60
+"""Maximum number of steps along a curve of one freedom (thirty revolutions) and of several
+freedoms, for which one curve of a revolution is an example."""
 _SHORTEST = 1.0
+"""Shortest open self-motion [rad or arm lengths]: a valley at a multiple root is far shorter."""
 _AWAY = 0.05
 """Distance [rad or arm lengths] at which a self-motion must still hold the pose. At a double root
 the residual there is about 1e-3, far above the tolerance, and the null space is still tangent."""
 _TRIES = 24
+"""Random null-space directions in which a self-motion is searched if there are several."""
 _SEED = 20260108
-_ZERO = 1e-6
-"""Singular values below this count as zero: on a self-motion their error is 1e-6, the square root
-of the tolerance 1e-12."""
 _INTEGER = 1e-3
 """Distance from integers within which slopes are rounded. A singular configuration and its null
 space are known to half the digits or fewer. The residual rejects a wrong rounding."""
@@ -171,16 +170,13 @@ class _Way:
 Whole = Callable[[Array], Array]
 """Function from chain positions (n,) to the robot configuration (nq,); NaN if loops stay open."""
 
-_MOVES = 1e-6
+_MOVES = SINGULAR_ERROR
 """Range of a joint [rad or arm lengths] along a curve, or slope relative to the free joint, above
-which the joint moves. Points are solved to 1e-12, singular points to its square root."""
-_SAME = 1e-6
-"""Distance [rad or arm lengths] from a curve below which a configuration belongs to it: singular
-points are known to 1e-6."""
+which the joint moves."""
 _AS_NEAR = 1e-3
 """Difference [rad or arm lengths] below which distances of samples are equal. The ends of a curve
 are known to 1e-5, the square root of the tolerance over the curvature; samples are 0.1 apart."""
-_REFINEMENTS = 5
+_REFINEMENTS = 5  # of the end of a range; each divides the step by eight: 0.1 to 3e-6
 _COMPARABLE = 0.5
 """Fraction of the largest joint range above which a joint nearer to the base is the free joint."""
 
@@ -330,7 +326,7 @@ class _SelfMotion:
         else:
             held = along[:, None, :]
             found = target.corrected(start, held, np.sum(along * x, axis=1, keepdims=True), 12)
-        met = np.linalg.norm(found - x, axis=1) < _SAME
+        met = np.linalg.norm(found - x, axis=1) < SINGULAR_ERROR
         if not self.curve.slope.size:  # from farther away, another curve through x may be found
             met &= np.linalg.norm(start - x, axis=1) < _STEP
         return np.asarray(met)
@@ -454,9 +450,6 @@ def _end(target: Target, curve: ConfigurationCurve, free: int, sign: float) -> f
 _SURFACE_STEP, _STEPS = 0.15, 150
 """Step on a self-motion surface [rad or arm lengths], 9 degrees, which four Newton steps correct.
 All steps together cover more than three revolutions."""
-_ARRIVED = 1e-6
-"""Distance [rad or arm lengths] from the goal at which it is reached: a singular goal has an error
-of 1e-6, the square root of 1e-12."""
 
 
 def connected(target: Target, q: Array, goal: Array) -> NDArray[np.bool_]:
@@ -474,19 +467,19 @@ def connected(target: Target, q: Array, goal: Array) -> NDArray[np.bool_]:
     for _ in range(_STEPS):
         difference = target.wrapped(end - x)
         size = np.linalg.norm(difference, axis=1, keepdims=True)
-        if np.all(size < _ARRIVED):
+        if np.all(size < SINGULAR_ERROR):
             break
         _, J = target.excess(x)
         along = _project(J, difference * np.minimum(1.0, _SURFACE_STEP / np.maximum(size, NONZERO)))
         x = _correct(target, x + along)
-    arrived = np.linalg.norm(target.wrapped(end - x), axis=1) < _ARRIVED
+    arrived = np.linalg.norm(target.wrapped(end - x), axis=1) < SINGULAR_ERROR
     return np.asarray(arrived & (target.residual(x * target.unit) < target.tolerance))
 
 
 def _project(J: Array, difference: Array) -> Array:
     """Project differences (m, n) on the null spaces of J (m, 6, n)."""
     _, s, Vt = np.linalg.svd(J, full_matrices=False)
-    rows = np.where((s > _ZERO)[..., None], Vt, 0.0)
+    rows = np.where((s > SINGULAR_ERROR)[..., None], Vt, 0.0)
     across = np.einsum("mki,mi->mk", rows, difference)
     return np.asarray(difference - np.einsum("mki,mk->mi", rows, across))
 
@@ -495,7 +488,7 @@ def _correct(target: Target, x: Array) -> Array:
     for _ in range(4):
         e, J = target.excess(x)
         U, s, Vt = np.linalg.svd(J, full_matrices=False)
-        inverse = np.where(s > _ZERO, 1.0 / np.maximum(s, _ZERO), 0.0)
+        inverse = np.where(s > SINGULAR_ERROR, 1.0 / np.maximum(s, SINGULAR_ERROR), 0.0)
         amount = inverse * np.einsum("mik,mi->mk", U, e)
         x = x - np.clip(np.einsum("mki,mk->mi", Vt, amount), -_SURFACE_STEP, _SURFACE_STEP)
     return x

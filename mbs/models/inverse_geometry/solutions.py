@@ -1,4 +1,4 @@
-"""Result classes of the inverse geometric model, joint limits and error reasons."""
+"""Result types of the inverse geometric model, joint limits and error reasons."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ WITHIN = 1e-9
 _TURNS = 4
 """Maximum number of revolutions to either side of the nearest position of a coordinate."""
 _MOST_WINDINGS = 64
+"""Maximum number of configurations that differ by full revolutions, as six joints of two each."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -172,13 +173,64 @@ def _pair(system: System, name: str, pair: object) -> tuple[float, float]:
     return low, high
 
 
-def _remainder(x: Array) -> Array:
-    return np.asarray(np.mod(x + np.pi, _TURN) - np.pi)
+# Types that pass solutions through the pipeline: see the docstring of the package.
 
 
 _MOST_ROWS = 64
+"""Largest number of solutions in the text of `Solutions`."""
 
 
+class PoseDraft:
+    """Configurations of a chain for one pose, before they are verified.
+
+    Attributes:
+        q: (m, n) joint positions of the chain [rad or m], possibly with copies.
+        residual: (m,) largest absolute difference of an element from the target pose.
+        certain: whether the list is complete and without copies. It is not certified near a
+            singular configuration.
+        method: name of the method.
+        near: (k, n) configurations with a small residual that Newton's method did not improve to
+            solutions. They are starts of a search along a valley.
+    """
+
+    __slots__ = ("_branch", "_names", "certain", "method", "near", "q", "residual")
+
+    def __init__(
+        self,
+        q: Array,
+        residual: Array,
+        names: Mapping[int, str] | Sequence[str],
+        branch: NDArray[Any] | None,
+        certain: bool,
+        method: str,
+        near: Array | None = None,
+    ) -> None:
+        """Store the configurations and their names.
+
+        `names` are the names of the branches, by the index that `branch` (m,) contains for each
+        configuration. Without `branch`, they are the names of the configurations.
+        """
+        self.q, self.residual, self.certain, self.method = q, residual, certain, method
+        self._names, self._branch, self.near = names, branch, near
+
+    def __len__(self) -> int:
+        """Return the number of configurations."""
+        return len(self.q)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Name of the branch of each configuration, "" without a branch."""
+        if self._branch is None:
+            return tuple(self._names)  # type: ignore[arg-type]
+        return tuple([self._names[b] for b in self._branch.tolist()])
+
+
+def _no_windings() -> Array:
+    return np.empty((0, 0))
+
+
+# Until `answer` completes it, q of a solution contains the positions (n,) of a chain, and residual,
+# singular value and limits are not known.
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
     """Configuration at which the frame has the target pose.
@@ -200,13 +252,17 @@ class Solution:
 
     q: Array
     branch: str
-    residual: float
-    sigma_min: float
-    multiplicity: int
-    within_limits: bool
-    _windings: Callable[[], Array] = field(repr=False)
+    residual: float = math.nan
+    sigma_min: float = math.nan
+    multiplicity: int = 1
+    within_limits: bool = True
+    _windings: Callable[[], Array] = field(default=_no_windings, repr=False)
     family: Family | None = None
     undecided: bool = False
+    _meeting: frozenset[str] = field(default=frozenset(), repr=False)
+    """Names of all closed-form branches that meet in q."""
+    _at_most: bool = field(default=False, repr=False)
+    """Whether the multiplicity is an upper bound."""
 
     @property
     def windings(self) -> Array:
@@ -218,16 +274,15 @@ class Solution:
 
 
 class RegularSolutions(Sequence[Solution]):
-    """Solutions of a regular pose, stored as arrays; each `Solution` is created on access."""
+    """Solutions of a certain draft, stored as arrays; each `Solution` is created on access."""
 
     __slots__ = (
         "_arm",
-        "_bounds",
-        "_branches",
+        "_draft",
         "_made",
-        "_near",
-        "_own",
-        "_residual",
+        "_names",
+        "_options",
+        "_order",
         "_sigma",
         "_within",
         "q",
@@ -236,30 +291,26 @@ class RegularSolutions(Sequence[Solution]):
     def __init__(
         self,
         q: Array,
-        branches: Sequence[str],
-        residual: Array,
-        arm: Arm,
-        own: Array,
-        bounds: CoordinateLimits,
-        near: Array,
         within: NDArray[np.bool_],
+        draft: PoseDraft,
+        order: NDArray[np.intp],
+        arm: Arm,
+        options: SolveOptions,
     ) -> None:
         """Store the solutions.
 
         Args:
-            q: (m, nq) configurations, shifted towards `near` within limits [rad or m].
-            branches: (m,) names of the branches.
-            residual: (m,) largest absolute element of pose(q) - T [m or 1].
+            q: (k, nq) configuration of each row of the draft, shifted within limits [rad or m].
+            within: (k,) whether each configuration is within limits.
+            draft: configurations of the chain.
+            order: (m,) rows of the draft that are solutions, in their order.
             arm: numeric geometry of the chain.
-            own: (m, n) chain positions [rad or m].
-            bounds: limits of the coordinates.
-            near: (nq,) configuration towards which angles are shifted by full revolutions.
-            within: (m,) whether each configuration is within limits.
+            options: limits, and the configuration towards which angles were shifted.
         """
-        self.q, self._branches, self._residual = q, branches, residual
-        self._arm, self._own, self._bounds, self._near = arm, own, bounds, near
-        self._within = within
-        self._sigma: Array | None = None
+        self.q, self._within, self._draft, self._order = q[order], within, draft, order
+        self._arm, self._options = arm, options
+        self._names: tuple[str, ...] = ()
+        self._sigma = np.zeros(0)
         self._made: dict[int, Solution] = {}
 
     def __len__(self) -> int:
@@ -278,16 +329,17 @@ class RegularSolutions(Sequence[Solution]):
         return self._made[number]
 
     def _solution(self, k: int) -> Solution:
-        if self._sigma is None:  # singular values do not depend on the pose
-            self._sigma = Target(self._arm, np.eye(4)).singular_values(self._own)[:, -1]
+        if not self._names:  # singular values do not depend on the pose
+            self._names, own = self._draft.labels, self._draft.q[self._order]
+            self._sigma = Target(self._arm, np.eye(4)).singular_values(own)[:, -1]
+        row, options = int(self._order[k]), self._options
         return Solution(
             self.q[k],
-            self._branches[k],
-            float(self._residual[k]),
+            self._names[row],
+            float(self._draft.residual[row]),
             float(self._sigma[k]),
-            1,
-            bool(self._within[k]),
-            partial(self._bounds.windings, self.q[k], self._near),
+            within_limits=bool(self._within[row]),
+            _windings=partial(options.bounds.windings, self.q[k], options.near),
         )
 
 
@@ -386,6 +438,50 @@ class Solutions(Sequence[Solution]):
         )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ManySolutions:
+    """Solutions of N poses: one row per pose, one column per branch.
+
+    With S positions of redundant joints, the columns of the first position are followed by the
+    columns of the second position, and so on. Use `q.reshape(N, S, -1, nq)` to separate them.
+
+    Attributes:
+        q: (N, S branches, nq) configurations [rad or m]; arbitrary finite values if not valid.
+        valid: (N, S branches) whether the column contains a solution.
+        residual: (N, S branches) largest absolute difference of an element between the pose of q
+            and the target, in m and 1; infinite in unused columns.
+        labels: names of the columns; empty texts without a closed form.
+        searched: (N,) whether the pose was solved individually at some position of redundant
+            joints. Its configurations are in the columns of the nearest branches.
+        undecided: (N,) whether double precision cannot decide the list of solutions at some
+            position of redundant joints; see `Solutions.undecided`.
+        samples: number S of positions of redundant joints, 1 without redundant joints.
+    """
+
+    q: Array
+    valid: NDArray[np.bool_]
+    residual: Array
+    labels: tuple[str, ...]
+    searched: NDArray[np.bool_]
+    undecided: NDArray[np.bool_]
+    samples: int = 1
+
+    def __len__(self) -> int:
+        """Return the number of poses."""
+        return len(self.q)
+
+    @property
+    def count(self) -> NDArray[np.int64]:
+        """Number of solutions of each pose, (N,)."""
+        count: NDArray[np.int64] = np.sum(self.valid, axis=1, dtype=np.int64)
+        return count
+
+    def of(self, k: int) -> Array:
+        """Return the solutions (m, nq) of pose k, counted from 0 [rad or m]."""
+        configurations: Array = self.q[k, self.valid[k]]
+        return configurations
+
+
 def _numbers(system: str, q: object) -> Array:
     try:
         near = np.asarray(q, dtype=float).ravel()
@@ -402,6 +498,8 @@ def _numbers(system: str, q: object) -> Array:
 
 
 _REASON_STARTS, _STEPS, _SEED = 40, 60, 20260109
+"""Random starts, and damped steps of each, that decide whether position or orientation alone can be
+reached. They decide only between error texts. Seed of the random numbers."""
 _REACHED = 1e-9
 """Largest dimensionless error of equations that have a solution. Damped steps end far below. A pose
 that is out of reach by less (1 nm per metre) is reported by its distance."""
@@ -492,19 +590,6 @@ def _reaches(target: Target, rows: slice) -> bool:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RobotSolution:
-    """Solution of the robot before limits are applied; attributes as in `Solution`."""
-
-    q: Array
-    branch: str
-    residual: float
-    sigma_min: float
-    multiplicity: int
-    family: Family | None = None
-    undecided: bool = False
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class SolveOptions:
     """Options of an inverse geometric problem.
 
@@ -523,9 +608,14 @@ class SolveOptions:
     strict: bool
     seeded: bool
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the coordinates of the robot."""
+        return self.bounds.names
+
     def solutions(
         self,
-        drafts: Sequence[RobotSolution],
+        found: Sequence[Solution],
         method: str,
         reason: str = "",
         nearest: Nearest | None = None,
@@ -533,31 +623,55 @@ class SolveOptions:
         """Apply the limits and the order, and return the solutions for the user.
 
         Args:
-            drafts: all solutions of the robot.
+            found: all solutions of the robot, without limits and full revolutions.
             method: name of the method that computed them.
             reason: explanation, if there is no solution.
             nearest: reachable pose nearest to the target, if there is no solution.
         """
-        every = [self._solution(draft) for draft in drafts]
+        every = [self._within(solution) for solution in found]
         kept = [s for s in every if s.within_limits or not self.strict]
         if self.seeded:
             kept.sort(key=lambda s: float(np.linalg.norm(s.q - self.near)))
         if every and not kept:
             reason = excluded([self.bounds.outside(s.q) for s in every])
-        names = tuple(coordinate.name for coordinate in self.system.coordinates)
-        return Solutions(self.system.name, names, tuple(kept), method, reason, nearest, self.bounds)
+        return self._answer(tuple(kept), method, reason, nearest)
 
-    def _solution(self, draft: RobotSolution) -> Solution:
-        wound, within = self.bounds.wound(draft.q[None], self.near)
-        q = wound[0]
-        return Solution(
-            q,
-            draft.branch,
-            draft.residual,
-            draft.sigma_min,
-            draft.multiplicity,
-            bool(within[0]),
-            partial(self.bounds.windings, q, self.near),
-            draft.family,
-            draft.undecided,
-        )
+    def regular_solutions(
+        self, draft: PoseDraft, indices: Sequence[int], arm: Arm
+    ) -> Solutions | None:
+        """Apply the limits and the order to a certain draft, and return its solutions.
+
+        Args:
+            draft: configurations of a chain.
+            indices: indices of the joints of the chain in q.
+            arm: numeric geometry of the chain.
+
+        Returns:
+            Solutions, or None if the limits leave none.
+        """
+        q = np.empty((len(draft), self.near.size))
+        q[:] = self.near
+        q[:, indices] = draft.q
+        q, within = self.bounds.wound(q, self.near)
+        order = np.flatnonzero(within) if self.strict else np.arange(len(q))
+        if not len(order):
+            return None
+        if self.seeded:
+            order = order[np.argsort(np.linalg.norm(q[order] - self.near, axis=1), kind="stable")]
+        return self._answer(RegularSolutions(q, within, draft, order, arm, self), draft.method)
+
+    def _answer(
+        self,
+        solutions: Sequence[Solution],
+        method: str,
+        reason: str = "",
+        nearest: Nearest | None = None,
+    ) -> Solutions:
+        system = self.system.name
+        return Solutions(system, self.names, solutions, method, reason, nearest, self.bounds)
+
+    def _within(self, solution: Solution) -> Solution:
+        """Return the solution shifted towards `near`, with its limits."""
+        wound, within = self.bounds.wound(solution.q[None], self.near)
+        windings = partial(self.bounds.windings, wound[0], self.near)
+        return replace(solution, q=wound[0], within_limits=bool(within[0]), _windings=windings)

@@ -24,12 +24,17 @@ from mbs.numbers import NONZERO
 SOLVED = 1e-12
 """Largest residual of a solution, of max(1 m, the arm's length)."""
 
+SINGULAR_ERROR = math.sqrt(SOLVED)
+"""Error of a singular solution [rad or arm lengths], 1e-6: the residual of a double root grows with
+the square of the distance from it. Differences of singular solutions below it count as zero."""
+
 ONE, TWO = 2e-14, 2e-13
 """Residuals, relative to max(1 m, arm length), between which it is undecided whether two solutions
 are equal. A perturbation of the pose changes the largest residual on a path between two solutions
 by at most its own size. Rounding of a pose by 100 units in the last place changes it by 2e-14."""
 DECIDED = 6e-14
-"""Geometric mean of `ONE` and `TWO`: residual below which two solutions are listed as one."""
+"""Geometric mean of `ONE` and `TWO`, to one digit: residual below which two solutions are listed as
+one."""
 
 NEARLY_SINGULAR = 1e-4
 """Smallest singular value, lengths divided by the arm length, below which a neighbouring solution
@@ -150,9 +155,8 @@ def nearly_singular(arm: Arm, q: Array, bound: float = NEARLY_SINGULAR) -> NDArr
 
 _SAME, _CLOSE = 1e-9, 1e-2
 """Distances [rad or arm lengths] below which two solutions are equal, and may be equal."""
-_FLOOR, _WORSE = 2e-15, 4.0
-"""Residual half way between two solutions, relative to max(1 m, arm length), that is a rounding
-error of the forward model (some units of 2e-16), and its largest ratio to the residual of the worse
+_WORSE = 4.0
+"""Largest ratio of the residual half way between two equal solutions to the residual of the worse
 solution. The residual half way grows with the square of the distance of two roots: roots are
 distinguished from a distance of 1e-7."""
 _ACROSS = 3  # Newton steps back to a curved valley: distances 1e-2, 1e-4, 1e-8, then rounding
@@ -266,9 +270,9 @@ _MEETING = DECIDED
 # is used at which Newton's method converges and a polynomial of degree 8 fits g up to rounding.
 _RADII = (0.05, 0.012, 3e-3, 7e-4, 1.5e-4, 3e-5, 6e-6)
 _ROUNDING = 3e-15  # rounding error of g, some tens of 1e-16: largest error of a fitted polynomial
-_HIGHEST = 4
+_HIGHEST = 4  # largest order of a root in one unknown that is examined
 _FARTHEST = 0.4  # largest step h [rad or arm lengths]: polynomials are invalid beyond 8 radii
-_DEGREE = 8
+_DEGREE = 8  # of the fitted polynomials: terms above are below rounding within the radius
 _SEED = 20260107
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from mbs.closed_forms.arm import Array
 from mbs.closed_forms.ring import spin_indices
 from mbs.errors import NoClosedForm
 from mbs.loops.closing import CLOSED, TOLERANCE, Closing, difference
-from mbs.loops.mode_search import closed_configurations, working_modes
+from mbs.loops.mode_search import closed_configurations, distance, working_modes
 from mbs.loops.plan import (
     Known,
     Posed,
@@ -26,7 +26,8 @@ from mbs.loops.plan import (
 from mbs.loops.pose import Goal, goal
 from mbs.models.geometry import terminal_frame
 from mbs.models.inverse_geometry.chain import FrameChain
-from mbs.models.inverse_geometry.solutions import RobotSolution, Solutions, SolveOptions
+from mbs.models.inverse_geometry.solutions import Solution, Solutions, SolveOptions
+from mbs.models.inverse_geometry.target import SINGULAR_ERROR
 
 # Configurations of trees and of robots with closed loops, from the joints between base and frame.
 #
@@ -49,25 +50,9 @@ _MOVED = 1e-5
 are up to 1e-6 at a double root. A larger move results in another configuration."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ClosedConfiguration:
-    """Configuration of the whole system with closed loops.
-
-    Attributes:
-        q: (nq,) positions [rad or m].
-        label: branch of the loop closure, such as "q9:parallel, q3:+"; empty if the closure has one
-            branch only, or was found by search.
-        residual: largest closure error of the loops, and of the pose if it was prescribed.
-    """
-
-    q: Array
-    label: str
-    residual: float
-
-
 def close(
     system: System, chain: FrameChain, configurations: Array, p: Array, seed: Array | None = None
-) -> list[ClosedConfiguration]:
+) -> list[Solution]:
     """Return all system configurations with given positions of the joints of a chain.
 
     All branches of the loop closure are computed by closed forms, or by a search from many starts
@@ -82,14 +67,15 @@ def close(
         seed: (nq,) reference configuration; default is the assembled configuration.
 
     Returns:
-        Configurations in the order of `configurations`. Empty if the loops cannot be closed.
+        Configurations with their loop branches, such as "q9:parallel, q3:+", and largest closure
+        errors, in the order of `configurations`. Empty if the loops cannot be closed.
 
     Raises:
         NoClosedForm: a spherical or free joint outside the chain keeps only some of its freedoms.
     """
     rest = np.array(system.configuration if seed is None else seed, dtype=float)
     given = _given(system, chain)
-    found = list[ClosedConfiguration]()
+    found = list[Solution]()
     for configuration in np.atleast_2d(np.asarray(configurations, dtype=float)):
         if configuration.size:
             q = rest.copy()
@@ -100,7 +86,7 @@ def close(
 
 def configurations_at(
     system: System, frame: str | int, T: Array, p: Array, seed: Array | None = None
-) -> list[ClosedConfiguration]:
+) -> list[Solution]:
     """Return all system configurations with a given pose of a frame, as for a parallel robot.
 
     The frame may be supported by spherical or free joints. The configurations are computed by
@@ -115,7 +101,8 @@ def configurations_at(
         seed: (nq,) reference configuration; default is the assembled configuration.
 
     Returns:
-        Configurations, sorted by distance from the seed.
+        Configurations with their loop branches and largest errors, sorted by distance from the
+        seed.
 
     Raises:
         LoopError: the search is used, and joints can move while the frame is fixed.
@@ -126,11 +113,11 @@ def configurations_at(
     plan = _plan_to(system, frame)
     if isinstance(plan, str):
         modes = working_modes(system, frame, T, guess=list(rest), parameters=values)
-        return [ClosedConfiguration(np.array(mode.q), "", mode.residual) for mode in modes]
+        return [Solution(np.array(mode.q), "", mode.residual) for mode in modes]
     target = goal(system, frame, T, None, values)
     branches = every_configuration(plan.stages, plan.started(T, rest), p)
     found = _distinct(system, _reaching(target, branches))
-    return sorted(found, key=lambda configuration: _distance(system, configuration.q, rest))
+    return sorted(found, key=lambda configuration: distance(system, configuration.q, rest))
 
 
 def why_searched(system: System, chain: FrameChain | str | int) -> str | None:
@@ -189,12 +176,10 @@ def _plan_to(system: System, frame: str | int) -> Posed | str:
     return plan
 
 
-def _complete(
-    system: System, given: tuple[int, ...], q: Array, p: Array
-) -> Iterable[ClosedConfiguration]:
+def _complete(system: System, given: tuple[int, ...], q: Array, p: Array) -> Iterable[Solution]:
     """Return the closed configurations with the positions `given` as in q (nq,)."""
     if not system.is_closed:
-        return [ClosedConfiguration(q, "", 0.0)]
+        return [Solution(q, "", 0.0)]
     known = _known(system, given)
     closing = Closing(system, p, known.indices)
     branches = _branches(closing, _stages(system, given), q)
@@ -221,7 +206,7 @@ def _agreeing(system: System, known: Known, q: Array, branches: _Branches) -> _B
             yield whole, branch
 
 
-def _closed(closing: Closing, branches: _Branches) -> Iterator[ClosedConfiguration]:
+def _closed(closing: Closing, branches: _Branches) -> Iterator[Solution]:
     """Keep the branches with closed loops, after correction of rounding errors."""
     for found, branch in branches:
         q = found
@@ -230,10 +215,10 @@ def _closed(closing: Closing, branches: _Branches) -> Iterator[ClosedConfigurati
             if np.max(np.abs(nearest.q - found)) < _MOVED:
                 q = nearest.q
         if closing.openness(q) < CLOSED and closing.faces(q):
-            yield ClosedConfiguration(q, ", ".join(branch), _largest(closing.rows(q)[0]))
+            yield Solution(q, ", ".join(branch), _largest(closing.rows(q)[0]))
 
 
-def _reaching(target: Goal, branches: _Branches) -> Iterator[ClosedConfiguration]:
+def _reaching(target: Goal, branches: _Branches) -> Iterator[Solution]:
     """Keep the branches with closed loops and the frame at its target pose."""
     for found, branch in branches:
         q = found[: target.closing.system.nq]
@@ -242,12 +227,10 @@ def _reaching(target: Goal, branches: _Branches) -> Iterator[ClosedConfiguration
             if np.max(np.abs(nearest.q - q)) < _MOVED:
                 q = nearest.q
         if target.openness(q) < CLOSED and target.closing.faces(q):
-            yield ClosedConfiguration(q, ", ".join(branch), _largest(target.residual(q)[0]))
+            yield Solution(q, ", ".join(branch), _largest(target.residual(q)[0]))
 
 
-def _distinct(
-    system: System, configurations: Iterable[ClosedConfiguration]
-) -> list[ClosedConfiguration]:
+def _distinct(system: System, configurations: Iterable[Solution]) -> list[Solution]:
     """Remove copies of equal configurations."""
     kept = list(configurations)
     along = [_mark(system, configuration.q) for configuration in kept]
@@ -257,7 +240,7 @@ def _distinct(
         for other in order[k + 1 :]:
             if along[other] - along[number] > _SAME * system.nq:
                 break
-            if _distance(system, kept[other].q, kept[number].q) < _SAME:
+            if distance(system, kept[other].q, kept[number].q) < _SAME:
                 twins.add(max(other, number))
     return [configuration for number, configuration in enumerate(kept) if number not in twins]
 
@@ -272,10 +255,6 @@ def _mark(system: System, q: Array) -> float:
     )
 
 
-def _distance(system: System, q: Array, other: Array) -> float:
-    return float(np.max(np.abs(difference(system, q, other)), initial=0.0))
-
-
 def _largest(rows: Array) -> float:
     return float(np.max(np.abs(rows), initial=0.0))
 
@@ -283,45 +262,34 @@ def _largest(rows: Array) -> float:
 # Robots whose frame has spherical joints or too many joints in its chain: closure of the legs.
 
 
-_SINGULAR = 1e-6
-"""Singular value of the pose and closure equations below which a solution has multiplicity 0: two
-roots at a distance of 1e-6 count as one."""
-
-
-def parallel(wishes: SolveOptions, frame: str | int | None, T: Array, p: Array) -> Solutions:
+def parallel(options: SolveOptions, frame: str | int | None, T: Array, p: Array) -> Solutions:
     """Compute all configurations of a robot with loops for a pose of a frame.
 
     Args:
-        wishes: robot and options of the user (limits, seed).
+        options: robot and options of the user (limits, seed).
         frame: argument of `solve`.
         T: (4, 4) target pose relative to the base [m].
         p: (np,) parameter values.
     """
-    system = wishes.system
+    system = options.system
     name = terminal_frame(system) if frame is None else frame
     searched = why_searched(system, name)
-    found = configurations_at(system, name, T, p, wishes.near)
+    found = configurations_at(system, name, T, p, options.near)
     method = "loops in closed form" if searched is None else "search"
     reason = "no configuration closes the loops and takes the frame to the pose"
     if searched is not None:
         reason += f"; it was searched for from many starts, which proves nothing: {searched}"
     values = {a.name: float(x) for a, x in zip(system.parameters, p, strict=True)}
     target = goal(system, name, T, None, values)
-    drafts = [
-        _draft(configuration, target.residual(configuration.q)[1], k)
-        for k, configuration in enumerate(found)
+    whole = [
+        _completed(solution, target.residual(solution.q)[1], k) for k, solution in enumerate(found)
     ]
-    return wishes.solutions(drafts, method, "" if drafts else reason)
+    return options.solutions(whole, method, "" if whole else reason)
 
 
-def _draft(configuration: ClosedConfiguration, slope: Array, number: int) -> RobotSolution:
-    """Return a robot solution with the smallest singular value of pose and loop equations."""
+def _completed(solution: Solution, slope: Array, number: int) -> Solution:
+    """Return a solution with the smallest singular value of pose and loop equations."""
     sigma = float(np.linalg.svd(slope, compute_uv=False)[-1])
-    count = 1 if sigma > _SINGULAR else 0
-    return RobotSolution(
-        configuration.q,
-        configuration.label or str(number + 1),
-        configuration.residual,
-        sigma,
-        count,
-    )
+    count = 1 if sigma > SINGULAR_ERROR else 0  # two roots at this distance count as one
+    name = solution.branch or str(number + 1)
+    return replace(solution, branch=name, sigma_min=sigma, multiplicity=count)

@@ -17,7 +17,7 @@ from mbs.loops.reduction import reduction
 from mbs.models._direct_dynamics import hybrid_dynamics
 from mbs.models.contacts import contacts_of, require_undriven
 from mbs.recursions.force_elements import sum_wrenches, wrench_efforts
-from mbs.recursions.poses import link_poses
+from mbs.recursions.link_motions import link_poses
 from mbs.recursions.route import BASE, relative_pose
 from mbs.spatial import Wrench, transform_wrench
 from mbs.text import did_you_mean, quoted

@@ -167,6 +167,34 @@ def test_c_source_is_a_folder_or_a_zip(command, tmp_path: Path) -> None:
     assert "planar_2r/planar_2r.c" in names
 
 
+def test_options_of_a_c_library_are_those_of_the_export(command, tmp_path: Path) -> None:
+    system = mbs.load("planar_2r").assemble()
+    models = {"idm": mbs.models.inverse_dynamics(system)}
+    for words, options in (
+        (("--bare", "--float"), {"target": "bare", "real": "float"}),
+        (("--no-checked",), {"checked": False}),
+        ((), {}),
+    ):
+        command("export", "c", "planar_2r", "arm", "--model", "idm", *words)
+        mbs.export.c_library(models, tmp_path / "own" / "arm", **options)
+        for file in ("arm.h", "arm.c"):
+            made, own = (tmp_path / folder / "arm" / file for folder in ("", "own"))
+            assert made.read_text() == own.read_text()
+    answer = command("export", "c", "planar_2r", "arm", "--float")
+    assert answer.code == 1
+    assert "real='float' is for bare libraries" in answer.err
+
+
+def test_texts_and_names_of_an_fmu_are_options(command) -> None:
+    words = ("--author", "A. Author", "--model-version", "1.2", "--flange", "tool", "--reference")
+    command("export", "fmu", "planar_2r", "arm.fmu", "--stop-time", "0.1", *words)
+    with zipfile.ZipFile("arm.fmu") as archive:
+        text = archive.read("modelDescription.xml").decode()
+        assert any("ref" in name for name in archive.namelist())
+    for part in ('author="A. Author"', 'version="1.2"', 'name="tool.fx"'):
+        assert part in text
+
+
 def test_a_picture_stands_alone(command, tmp_path: Path) -> None:
     command("export", "html", "four_bar", "p.html", "--q", "j1=0.5")
     text = (tmp_path / "p.html").read_text()

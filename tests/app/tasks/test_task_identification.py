@@ -40,7 +40,9 @@ def arm():
 @pytest.fixture(scope="module")
 def motion(arm):
     laws = {"q1.q": "0.5*sin(2*t) + 0.3*cos(5*t)", "q2.q": "0.7*sin(3*t) + 0.2*cos(7*t)"}
-    return simulate(arm, SimulationSettings(duration=10, step=0.005, motion=laws), quiet=True)
+    return simulate(
+        arm, SimulationSettings(duration=10, options={"step": 0.005}, motion=laws), quiet=True
+    )
 
 
 @pytest.fixture(scope="module")
@@ -102,9 +104,8 @@ def test_tables_hold_the_same_numbers(found):
 
 
 def test_settings_reach_the_estimation(arm, record):
-    chosen = IdentificationSettings(
-        20, "least_squares", "energy", rotors=False, offsets=True, velocities="measured"
-    )
+    options = {"method": "least_squares", "equations": "energy", "rotors": False, "offsets": True}
+    chosen = IdentificationSettings(20, "measured", options)
     found = identify(arm, record, chosen, quiet=True)
     names = {row.name for row in found.rows}
     assert not any(name.startswith("Ia") for name in names)
@@ -157,8 +158,8 @@ def test_malformed_files_are_refused_with_a_sentence(arm, content, parts):
 @pytest.mark.parametrize(
     ("given", "parts"),
     [
-        ({"method": "magic"}, ("'magic'", "weighted")),
-        ({"equations": "static"}, ("'static'", "dynamic")),
+        ({"options": {"method": "magic"}}, ("'magic'", "weighted")),
+        ({"options": {"equations": "static"}}, ("'static'", "dynamic")),
         ({"velocities": "guessed"}, ("'guessed'", "measured")),
         ({"bandwidth": "high"}, ("bandwidth", "'high'")),
         ({"bandwidth": 5000}, ("bandwidth", "100 Hz")),

@@ -11,14 +11,12 @@ from support.catalogue_systems import catalogue_system
 from support.messages import refused
 
 import mbs
+from mbs.app.tasks.laws import assignments, law_of_time, number
 from mbs.app.tasks.simulation import (
     SimulationSettings,
-    assignments,
     csv_bytes,
     film,
     known_values,
-    law_of_time,
-    number,
     run_arguments,
     simulate,
 )
@@ -41,7 +39,7 @@ def symbolic_arm():
 def test_texts_simulate_what_functions_do(arm):
     texts = SimulationSettings(
         duration="1/2",
-        step=0.05,
+        options={"step": 0.05},
         q0={"q1": "pi/4"},
         v0={"q2": "-0.5"},
         tau={"q1": "5*sin(2*t) - 0.3*q1.v", "q2": "2*(q1.q - q2.q)"},
@@ -87,13 +85,13 @@ def test_a_four_bar_stays_closed_and_keeps_its_energy():
 
 
 def test_a_film_keeps_the_rows_that_a_picture_needs(arm):
-    shown = film(arm, SimulationSettings(duration=10, step=0.005))
+    shown = film(arm, SimulationSettings(duration=10, options={"step": 0.005}))
     assert len(shown.result) == 2001
     assert (len(shown.times), shown.configurations.shape) == (300, (300, 2))
     assert (shown.times[0], shown.times[-1]) == (0.0, 10.0)
     rows = np.searchsorted(shown.result.time, shown.times)
     np.testing.assert_array_equal(shown.configurations[:, 1], shown.result["q2.q"][rows])
-    many = SimulationSettings(step=1e-6)
+    many = SimulationSettings(options={"step": 1e-6})
     refused(ModelError, "100000 rows", by=lambda: film(arm, many))
 
 
@@ -117,9 +115,9 @@ def test_the_table_of_a_result_reads_back_bit_for_bit(arm, tmp_path):
         ({"q0": {"q1": "t"}}, ("q0 of q1", "'t'")),
         ({"duration": "1/0"}, ("duration", "not a finite number")),
         ({"duration": "-1"}, ("duration", "finite positive")),
-        ({"step": "0"}, ("step", "finite positive")),
-        ({"tolerance": "tight"}, ("tolerance", "'tight'")),
-        ({"method": "euler"}, ("'euler'", "dopri5, rodas")),
+        ({"options": {"step": "0"}}, ("step", "finite positive")),
+        ({"options": {"tolerance": "tight"}}, ("tolerance", "'tight'")),
+        ({"options": {"method": "euler"}}, ("'euler'", "dopri5, rodas")),
         ({"motion": {"q1": "t"}}, ("'q1'", "'q1.q'")),
         ({"motion": {"q1.q": "q2.q"}}, ("motion of q1.q", "'q2.q'")),
         ({"inputs": {"motor": "1"}}, ("no motor",)),

@@ -16,7 +16,7 @@ from mbs.app.web.panels.identification import open_identification
 def record():
     arm = mbs.load("planar_2r").assemble()
     laws = {"q1.q": "0.5*sin(2*t) + 0.3*cos(5*t)", "q2.q": "0.7*sin(3*t) + 0.2*cos(7*t)"}
-    settings = SimulationSettings(duration=6, step=0.01, motion=laws)
+    settings = SimulationSettings(duration=6, motion=laws)
     return csv_bytes(simulate(arm, settings, quiet=True))
 
 

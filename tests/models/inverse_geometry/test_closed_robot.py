@@ -81,7 +81,7 @@ def test_both_assemblies_of_the_sr400(systems, way, seed):
     found = solutions(system, 6, T)
     assert_solved(system, 6, T, found)
     assert any(same(system, configuration.q, q, 1e-7) for configuration in found)
-    labels = [configuration.label for configuration in found]
+    labels = [configuration.branch for configuration in found]
     assert labels.count("q8:parallel") == labels.count("q8:crossed") == len(found) / 2
 
 
@@ -106,7 +106,7 @@ def test_delta_has_eight_configurations(systems, seed):
     assert_solved(system, "tool", T, found)
     assert why_searched(system, "tool") is None
     assert len(found) == len(mbs.loops.working_modes(system, "tool", T, tries=100)) == 8
-    assert len({configuration.label for configuration in found}) == 8
+    assert len({configuration.branch for configuration in found}) == 8
     assert any(same(system, configuration.q, q, 1e-7) for configuration in found)
     T[:3, :3] = T[:3, :3] @ np.diag([-1, -1, 1])
     assert configurations_at(system, "tool", T, NONE) == []
@@ -226,7 +226,7 @@ def test_search_with_positions_held_finds_what_closed_forms_find(systems):
     system = systems["akr3000"]
     q = drawn(system, 0.03, 3)
     places = frame_chain(system, 10).indices
-    found = closed_configurations(Closing(system, NONE, places), q)
+    found = list(closed_configurations(Closing(system, NONE, places), q))
     exact = close(system, frame_chain(system, 10), q[list(places)], NONE)
     assert len(found) == len(exact) == 4
     for configuration in exact:

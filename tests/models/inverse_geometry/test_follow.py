@@ -107,6 +107,18 @@ def test_a_path_that_leaves_a_singular_configuration_stops_where_it_leaves(puma)
     assert "between poses 2 and 3 of 12" in found.reason
 
 
+def test_a_singular_start_names_a_start_from_which_the_path_goes_on(puma):
+    start = ELBOW_UP.copy()
+    start[4] = 0.0
+    T = poses(puma, 6, line(start, ELBOW_UP + np.array([0.05, 0.05, -0.05, 0, 0, 0]), 10))
+    found = follow(puma, T, start, limits=False)
+    assert found.reached == 0
+    text = found.reason.partition("from pose 1 on with a start on one of them, such as ")[2]
+    other = [float(value) for value in text.partition(", or another solution")[0].split(",")]
+    further = follow(puma, T[1:], other, limits=False)
+    assert (further.reached, further.reason) == (8, "")
+
+
 @pytest.mark.parametrize("count", [3, 20, 21])
 @pytest.mark.parametrize("function", [False, True])
 def test_through_a_straight_wrist_it_goes_on(puma, count, function):

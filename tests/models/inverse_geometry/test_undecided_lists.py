@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.near_singular import KINDS, ROBOTS, at_distance, plain, robot, units_away
 
-from mbs.models.inverse_geometry import function, many, solve, solve_many, solver
+from mbs.models.inverse_geometry import draft_many, function, solve, solve_many, solver
 from mbs.native import compiled
 
 CASES = [(name, kind) for name in ROBOTS[:-1] for kind in KINDS] + [(ROBOTS[-1], "wrist")]
@@ -58,7 +58,7 @@ def test_more_poses_are_marked_as_each_alone(name, kind, seed):
 def test_without_a_compiler_and_by_machine_code_the_marks_are_the_same(name, monkeypatch):
     T = near(name, "wrist", 1).reshape(-1, 4, 4)
     one = solve_many(robot(name), T)
-    monkeypatch.setattr(many, "MANY", 1)
+    monkeypatch.setattr(draft_many, "MANY", 1)
     machine = solve_many(robot(name), T)
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("CC", raising=False)

@@ -38,8 +38,7 @@ from mbs.formats import (
     read_urdf,
     to_mechanism,
 )
-from mbs.formats.base_pose import POSE, base_pose_texts, placement_pose
-from mbs.formats.table import DRIVE, GEOMETRY, LOOP_JOINTS
+from mbs.formats.table import DRIVE, GEOMETRY, LOOP_JOINTS, POSE, base_pose_texts, placement_pose
 from mbs.formats.xml import parse_xml
 from mbs.mechanism import Mechanism
 from mbs.spatial.inertia import TEN_PARAMETERS

@@ -12,15 +12,24 @@ import numpy as np
 
 from mbs.app.tasks.mounting import mounting_of
 from mbs.components import Rotor
+from mbs.components.bodies import mount_of
 from mbs.components.component import Placement, in_rotated_axes
-from mbs.components.mounting import mount_of
 from mbs.errors import DescriptionError, ExpressionError, MbsError
 from mbs.expressions import Expression, Number, Scalar, expression, parameters_of, to_float
 from mbs.expressions import number as number_of
 from mbs.formats import CutRow, FrameRow, RobotTable
-from mbs.formats.base_pose import POSE, base_placement, base_pose_texts, placement_pose
 from mbs.formats.rotations import angles_of
-from mbs.formats.table import BODY_SCALARS, GEOMETRY, JOINTS, LOOP_JOINTS, InertiaRow
+from mbs.formats.table import (
+    BODY_SCALARS,
+    GEOMETRY,
+    JOINTS,
+    LOOP_JOINTS,
+    POSE,
+    InertiaRow,
+    base_placement,
+    base_pose_texts,
+    placement_pose,
+)
 from mbs.text import did_you_mean, quoted
 
 # Columns of the tables of a robot, and readers of the texts in their cells.

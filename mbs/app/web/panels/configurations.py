@@ -42,6 +42,8 @@ from mbs.errors import MbsError
 from mbs.expressions import number as number_of
 from mbs.models.catalogue.configurations import moving_joints, surplus_joints
 from mbs.models.geometry import terminal_frame
+from mbs.models.inverse_geometry.options import PoseOptions
+from mbs.options import option_fields
 
 # Configurations that solve the inverse kinematics, as a table whose rows move the picture.
 
@@ -262,14 +264,6 @@ def _line(row: Sequence[float]) -> str:
 
 KEY = "configurations"
 
-_MEANINGS = {
-    "auto": "the cheapest that fits",
-    "pieper": "Pieper",
-    "paul": "Paul",
-    "general": "general (Raghavan and Roth)",
-    "search": "search from random starts",
-}
-
 _PRESENT, _GIVEN = "present", "given"
 _POSITIONS = {
     _PRESENT: "stays as in the picture",
@@ -312,7 +306,10 @@ class _ConfigurationsPanel:
                 on_change=self._framed,
             )
             self._frame.props(FIELD).style("flex: 1 1 90px").mark("frame")
-            self._method = ui.select(_MEANINGS, label="method", value=entry(key).solver or "auto")
+            first, method = option_fields(PoseOptions)["method"]
+            self._method = ui.select(
+                dict(method.choices), label="method", value=entry(key).solver or first.default
+            )
             self._method.props(FIELD).style("flex: 2 1 190px").mark("method")
         with left, ui.element("div").classes("app-form") as self._surplus:
             self._joint = ui.select([], label="joint", on_change=self._surplus_changed)

@@ -11,9 +11,7 @@ from typing import Any, cast
 from nicegui import ui
 
 from mbs.app.tasks.identification import (
-    EQUATIONS,
     LARGEST,
-    METHODS,
     VELOCITIES,
     EstimateRow,
     IdentificationSettings,
@@ -23,18 +21,25 @@ from mbs.app.tasks.identification import (
 )
 from mbs.app.web.app import App
 from mbs.app.web.panels.layout import TaskButton, tell_of_changes
+from mbs.app.web.panels.options_form import (
+    FormValues,
+    first_values,
+    flags_field,
+    form_texts,
+    option_row,
+)
 from mbs.app.web.panels.plots import (
     FieldLook,
     add_look,
     choice_field,
     come_into_view,
     line_chart,
-    several_field,
     text_field,
 )
 from mbs.app.web.panels.text_view import column
 from mbs.assembly import System
 from mbs.identification._identify import POOR
+from mbs.identification.options import IdentifyArguments
 from mbs.text import quoted
 
 # Results of an identification: tables, residuals, and files to download.
@@ -179,7 +184,6 @@ _NOTE = "identification"
 _FOUND = "identified"
 """Name of the session note with the document and the last result, for a reload of the page."""
 _LONGEST_LIST = 12
-_COLUMNS = {"rotors": "rotors", "offsets": "offsets"}
 
 
 @dataclass(slots=True)
@@ -189,20 +193,12 @@ class _IdentificationAsked:
     content: bytes = b""
     file: str = ""
     bandwidth: str = "10"
-    method: str = "weighted"
-    equations: str = "dynamic"
     velocities: str = "differences"
-    columns: list[str] = field(default_factory=lambda: ["rotors"])
+    options: FormValues = field(default_factory=lambda: first_values(IdentifyArguments))
 
     def settings(self) -> IdentificationSettings:
-        return IdentificationSettings(
-            bandwidth=self.bandwidth,
-            method=self.method,
-            equations=self.equations,
-            rotors="rotors" in self.columns,
-            offsets="offsets" in self.columns,
-            velocities=self.velocities,
-        )
+        options = form_texts(IdentifyArguments, self.options)
+        return IdentificationSettings(self.bandwidth, self.velocities, options)
 
 
 def open_identification(app: App) -> None:
@@ -312,18 +308,12 @@ def _form(asked: _IdentificationAsked) -> None:
         look = FieldLook("Bandwidth [Hz]", "120px", "bandwidth")
         field = text_field(look, asked.bandwidth, partial(setattr, asked, "bandwidth"))
         field.tooltip("of the filters; five to ten times the highest frequency of the motion")
-        _choice(asked, METHODS, FieldLook("Method", "190px", "method"))
-        _choice(asked, EQUATIONS, FieldLook("Equations", "120px", "equations"))
-        _choice(asked, VELOCITIES, FieldLook("Velocities", "190px", "velocities"))
-        several_field(
-            FieldLook("Beside bodies and friction", "324px", "columns"),
-            _COLUMNS,
-            asked.columns,
-            partial(setattr, asked, "columns"),
+        option_row(IdentifyArguments, asked.options)
+        choice_field(
+            FieldLook("Velocities", "160px", "velocities"),
+            {name: name for name in VELOCITIES},
+            asked.velocities,
+            partial(setattr, asked, "velocities"),
         )
-
-
-def _choice(asked: _IdentificationAsked, names: tuple[str, ...], look: FieldLook) -> None:
-    options = {name: name.replace("_", " ") for name in names}
-    chosen = getattr(asked, look.marker)
-    choice_field(look, options, chosen, partial(setattr, asked, look.marker))
+        look = FieldLook("Beside bodies and friction", "324px", "columns")
+        flags_field(IdentifyArguments, asked.options, look)

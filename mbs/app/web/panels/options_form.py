@@ -16,8 +16,10 @@ FormValues = dict[str, Any]
 """Values of a form by option: a text, a choice or a list of names. The names in a list that the
 form does not offer are a text "more_..."."""
 
-_NUMBER, _CHOICE, _NAMES = "112px", "160px", "150px"
+_NUMBER, _NAMES = "112px", "150px"
 """Widths of fields, enough for their labels."""
+_CHOICE, _MENU, _LETTER = 160, 46, 7
+"""Least width of a choice, and widths of its arrow with margins and of a letter [CSS pixels]."""
 
 
 def first_values(options: type) -> FormValues:
@@ -68,16 +70,7 @@ def option_form(
     shown = {name: option for name, (_, option) in option_fields(options).items() if option.in_form}
     lists = {name: option for name, option in shown.items() if kinds[name] == "names"}
     with ui.element("div").classes("app-form"):
-        choices: dict[str, ui.select] = {}
-        for name, option in shown.items():
-            if kinds[name] == "choice":
-                choices[name] = _choice(values, name, option)
-        for name, option in shown.items():
-            if kinds[name] == "number":
-                field = _text(values, name, FieldLook(title_of(name, option), _NUMBER, name))
-                if option.only_with is not None:
-                    other, needed = option.only_with
-                    field.bind_visibility_from(choices[other], "value", needed.__contains__)
+        option_row(options, values)
     for name, option in lists.items():
         if option.offered:
             _several(values, name, option, offered.get(name, option.offered))
@@ -87,13 +80,56 @@ def option_form(
             field.tooltip(f"such as {option.example.format(joint=joint)}; commas between them")
 
 
+def option_row(options: type, values: FormValues) -> None:
+    """Create the fields of choices and numbers, in the present element.
+
+    Args:
+        options: dataclass of the options.
+        values: values of the form, complete. They are updated while the user types.
+    """
+    kinds = value_kinds(options)
+    shown = {name: option for name, (_, option) in option_fields(options).items() if option.in_form}
+    choices: dict[str, ui.select] = {}
+    for name, option in shown.items():
+        if kinds[name] == "choice":
+            choices[name] = _choice(values, name, option)
+    for name, option in shown.items():
+        if kinds[name] == "number":
+            field = _text(values, name, FieldLook(title_of(name, option), _NUMBER, name))
+            if option.only_with is not None:
+                other, needed = option.only_with
+                field.bind_visibility_from(choices[other], "value", needed.__contains__)
+
+
+def flags_field(options: type, values: FormValues, look: FieldLook) -> None:
+    """Create one field for all options that are either on or off.
+
+    Args:
+        options: dataclass of the options.
+        values: values of the form, complete. They are updated when the user chooses.
+        look: appearance of the field.
+    """
+    kinds = value_kinds(options)
+    shown = {name: option for name, (_, option) in option_fields(options).items() if option.in_form}
+    flags = {name: option.label or name for name, option in shown.items() if kinds[name] == "flag"}
+
+    def take(chosen: Sequence[str]) -> None:
+        values.update({name: name in chosen for name in flags})
+
+    several_field(look, flags, [name for name in flags if values[name]], take)
+
+
 def _text(values: FormValues, key: str, look: FieldLook) -> ui.input:
     return text_field(look, values[key], partial(values.__setitem__, key))
 
 
 def _choice(values: FormValues, name: str, option: OptionInfo) -> ui.select:
-    labels = {one: f"{one}, {word}" if word else one for one, word in option.choices.items()}
-    look = FieldLook(title_of(name, option), _CHOICE, name)
+    labels = {
+        one: f"{one}, {word}" if word else one.replace("_", " ")
+        for one, word in option.choices.items()
+    }
+    width = max(_CHOICE, _MENU + _LETTER * max(map(len, labels.values())))
+    look = FieldLook(title_of(name, option), f"{width}px", name)
     return choice_field(look, labels, values[name], partial(values.__setitem__, name))
 
 

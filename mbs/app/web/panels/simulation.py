@@ -15,6 +15,7 @@ from mbs.app.tasks.exporting import file_stem
 from mbs.app.tasks.simulation import Movie, SimulationSettings, csv_bytes, film
 from mbs.app.web.app import App
 from mbs.app.web.panels.layout import new_answer, tell_of_changes
+from mbs.app.web.panels.options_form import first_values, form_texts, option_row
 from mbs.app.web.panels.plots import (
     FieldLook,
     add_look,
@@ -25,12 +26,14 @@ from mbs.app.web.panels.plots import (
 )
 from mbs.assembly import System
 from mbs.result import Result
+from mbs.simulate.options import MotionOptions
 
 # Texts of the form of a simulation, and the settings that they specify.
 
 
 Texts = dict[str, str]
-"""Texts of the form by field: "duration", "method" and so on, and "q0.j1", "law.j1", "kind.j1"."""
+"""Texts of the form by field: "duration", "start", names of options, and fields of joints such as
+"q0.j1", "law.j1" and "kind.j1"."""
 
 Row = tuple[str, str, str, bool]
 """Name of a joint, unit of its position ("" for several), unit of its rate, whether actuated."""
@@ -41,19 +44,10 @@ KINDS = {"tau": "effort", "q": "position", "v": "velocity", "a": "acceleration"}
 PICTURE = "the configuration of the picture"
 TYPED = "typed positions"
 
-_FIRST = {
-    "duration": "2",
-    "step": "0.01",
-    "tolerance": "1e-8",
-    "method": "dopri5",
-    "max_step": "",
-    "start": PICTURE,
-}
-
 
 def first_texts(texts: Mapping[str, str]) -> Texts:
     """Return the texts of all fields: as typed before, else by default."""
-    return {**_FIRST, **texts}
+    return {"duration": "2", "start": PICTURE, **first_values(MotionOptions), **texts}
 
 
 def chosen_rows(system: System) -> list[Row]:
@@ -77,10 +71,7 @@ def settings_of(system: System, texts: Mapping[str, str], q: Sequence[float]) ->
     kinds = {name: texts.get(f"kind.{name}", "") for name in laws}
     return SimulationSettings(
         duration=texts["duration"],
-        step=texts["step"],
-        tolerance=texts["tolerance"],
-        method=texts["method"],
-        max_step=texts["max_step"].strip(),
+        options=form_texts(MotionOptions, texts),
         q0=_given(texts, "q0", [name for name, unit, *_ in rows if unit]) if typed else {},
         configuration=() if typed else tuple(q),
         v0=_given(texts, "v0", [name for name, *_ in rows]),
@@ -98,7 +89,6 @@ def _given(texts: Mapping[str, str], what: str, names: Sequence[str]) -> dict[st
 # Form of a simulation: times, start, and drives of the joints.
 
 
-_METHODS = {"dopri5": "dopri5, explicit", "rodas": "rodas, for stiff systems"}
 _LAWS = (
     "Laws are numbers, or texts of t, of positions and velocities such as {0}.q and {0}.v, and of"
     " symbols: 5*sin(2*t) - 0.3*{0}.v"
@@ -117,10 +107,7 @@ def build_form(system: System, texts: Texts) -> ui.button:
     """
     with ui.element("div").classes("app-form"):
         _text(texts, "duration", "Duration [s]", "96px")
-        _text(texts, "step", "Row every [s]", "104px")
-        _text(texts, "tolerance", "Tolerance", "96px")
-        _choice(texts, "method", _METHODS, "Method", "214px")
-        _text(texts, "max_step", "Longest step [s]", "112px")
+        option_row(MotionOptions, texts)
     with ui.element("div").classes("app-form").style("align-items: center"):
         start = _choice(texts, "start", {x: x for x in (PICTURE, TYPED)}, "Starts at", "240px")
         button = ui.button("Run").props("unelevated no-caps dense").mark("simulate")

@@ -166,14 +166,23 @@ static int from_start(const loops *l, const real *x, real *z) {
 
 static int guessed(const loops *l, int i) { return l->guess[i] != MODEL_START[DEPENDENTS + i]; }
 
+#if NCUT > 0
+static int cut_guessed(const loops *l, int i) { return l->cut[i] != MODEL_START[CUTS + i]; }
+#endif
+
 static int any_guessed(const loops *l) {
     int i;
     for (i = 0; i < NZ; i++)
         if (guessed(l, i)) return 1;
+#if NCUT > 0
+    for (i = 0; i < NCUT; i++)
+        if (cut_guessed(l, i)) return 1;
+#endif
     return 0;
 }
 
-/* Difference of two values of dependent coordinate i [rad or m], of angles modulo a revolution.
+/* Difference of two values of dependent coordinate i, or of position i - NZ of the cut joints [rad
+ * or m], of angles modulo a revolution.
  * Half a revolution is always positive, so that rounding cannot change its sign (aligned bars). */
 static real difference(int i, real z, real other) {
     real d = z - other;
@@ -182,10 +191,37 @@ static real difference(int i, real z, real other) {
     return d < EQUAL - HALF_TURN ? d + REAL(2.0) * HALF_TURN : d;
 }
 
-/* Largest distance of z from the guesses [rad, or sizes of the mechanism]. all: 1 for all
- * coordinates, 0 for the guessed coordinates. */
-static real distance_from_guess(const loops *l, const real *z, int all) {
+/* Largest distance of the cut joints from their guesses at x, z [rad, or sizes of the mechanism]. */
+static real cut_distance(const loops *l, const real *x, const real *z) {
     real far = REAL(0.0);
+#if NCUT > 0
+    real at[NCUT];
+    int i, k;
+    for (i = 0; i < NCUT && !cut_guessed(l, i); i++) continue;
+    if (i == NCUT) return far;
+    l->arg[0] = x;
+    l->arg[1] = z;
+    l->arg[2] = l->p;
+    l->res[0] = at;
+    if (mbs_cuts(l->arg, l->res, l->iw, l->w, 0)) return UNBOUNDED;
+    for (i = 0; i < NCUT; i++) { /* a quaternion and its negative are one orientation */
+        real along = REAL(0.0);
+        for (k = i; MODEL_QUATERNIONS[i] && k < i + 4; k++) along += at[k] * l->cut[k];
+        for (k = i; along < REAL(0.0) && k < i + 4; k++) at[k] = -at[k];
+    }
+    for (i = 0; i < NCUT; i++)
+        if (cut_guessed(l, i))
+            far = real_max(far, real_abs(difference(NZ + i, at[i], l->cut[i])) / MODEL_SPANS[NZ + i]);
+#else
+    (void)l, (void)x, (void)z;
+#endif
+    return far;
+}
+
+/* Largest distance of z from the guesses at the states x [rad, or sizes of the mechanism]. all: 1
+ * for all coordinates, 0 for the guessed coordinates. Cut joints count if they are guessed. */
+static real distance_from_guess(const loops *l, const real *x, const real *z, int all) {
+    real far = cut_distance(l, x, z);
     int i;
     for (i = 0; i < NZ; i++)
         if (all || guessed(l, i))
@@ -195,10 +231,10 @@ static real distance_from_guess(const loops *l, const real *z, int all) {
 
 /* Whether z is nearer to the guesses than `other`, in the order of mbs.loops.nearest: distance of
  * the guessed coordinates, then of all, then the larger value of the first different coordinate. */
-static int is_nearer(const loops *l, const real *z, const real *other) {
+static int is_nearer(const loops *l, const real *x, const real *z, const real *other) {
     int i, all;
     for (all = 0; all < 2; all++) {
-        real more = distance_from_guess(l, z, all) - distance_from_guess(l, other, all);
+        real more = distance_from_guess(l, x, z, all) - distance_from_guess(l, x, other, all);
         if (real_abs(more) > EQUAL) return more < REAL(0.0);
     }
     for (i = 0; i < NZ; i++) {
@@ -256,12 +292,12 @@ static int near_guesses(const loops *l, const real *x, real *z) {
         trial_start(l, k, near, trial);
         if (newton(l, x, trial, UNBOUNDED) != CLOSURE_OK) continue;
         unwind(l, x, trial);
-        if (!found || is_nearer(l, trial, z)) {
+        if (!found || is_nearer(l, x, trial, z)) {
             memcpy(z, trial, sizeof trial);
             status = CLOSURE_OK;
             found = 1;
         }
-        if (k == 0 && distance_from_guess(l, trial, 1) < CLOSE) {
+        if (k == 0 && distance_from_guess(l, x, trial, 1) < CLOSE) {
             memcpy(z, trial, sizeof trial);
             return CLOSURE_OK;
         }

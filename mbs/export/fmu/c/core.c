@@ -145,8 +145,17 @@ core_status core_accept_states(core *c) {
 
 /* Check that the calculated values are finite, and mark them as up to date. */
 static core_status core_show(core *c) {
-    const double *v = c->m.values;
+    double *v = c->m.values;
     int i;
+#if NCUT > 0
+    c->arg[0] = v + STATES;
+    c->arg[1] = v + DEPENDENTS;
+    c->arg[2] = v + PARAMETERS;
+    c->res[0] = v + CUTS;
+    if (mbs_cuts(c->arg, c->res, c->iw, c->w, 0))
+        return core_no_answer(c, "%s: the cut joints have no positions at time %.9g", c->name,
+                              c->m.time);
+#endif
     for (i = 0; i < INDICATORS; i++) /* event indicators are checked when they are read */
         if (!isfinite(v[i]))
             return core_no_answer(c, "%s: %s is not finite at time %.9g; look for a singular "
@@ -234,14 +243,15 @@ static void to_start(core *c) {
     c->m.stop = HUGE_VAL;
     memcpy(c->m.values, MODEL_START, N_VALUES * sizeof *c->m.values);
     memcpy(c->m.guess, MODEL_START + DEPENDENTS, NZ * sizeof *c->m.guess);
+    memcpy(c->m.cut, MODEL_START + CUTS, NCUT * sizeof *c->m.cut);
 #ifdef MODEL_TREE
     memcpy(c->m.speeds, MODEL_START + OUTPUTS + PASSIVE_V, N_PASSIVE * sizeof *c->m.speeds);
 #endif
 }
 
 static void init_loops(core *c) {
-    loops l = {c->m.configuration_x, c->m.configuration_z, c->m.guess, c->m.values + PARAMETERS,
-               c->arg,         c->res,         c->iw,      c->w};
+    loops l = {c->m.configuration_x, c->m.configuration_z, c->m.guess, c->m.cut,
+               c->m.values + PARAMETERS, c->arg, c->res, c->iw, c->w};
     c->loops = l;
 }
 

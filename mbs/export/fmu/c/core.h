@@ -32,7 +32,8 @@ enum {
     SLOTS = INDICATORS + NK, /* states of closed loops for an external integrator (charts.h) */
     RATES = SLOTS + NS,      /* derivatives of these states */
     CHART = RATES + NS,      /* indicator of a change of their coordinates */
-    N_VALUES = CHART + NC,
+    CUTS = CHART + NC,       /* positions of cut joints */
+    N_VALUES = CUTS + NCUT,
     TIME_REFERENCE = N_VALUES /* the independent variable time, a variable in FMI 3.0 only */
 };
 
@@ -119,6 +120,7 @@ typedef struct {
     double time, tolerance, stop; /* stop: end of the experiment [s], HUGE_VAL if it has none */
     double values[N_VALUES + 1];
     double guess[NZ + 1];
+    double cut[NCUT + 1]; /* guess of the positions of cut joints */
     /* last accepted configuration: warm start of the Newton steps */
     double configuration_x[NX + 1], configuration_z[NZ + 1];
     double input_time;                  /* time of `slopes` and the values of inputs [s] */

@@ -155,7 +155,8 @@ static int sane(const core_memory *m) {
     if (!all_finite(v + PARAMETERS, NP + NM)) return 0;
     if (!parameters_in_bounds(v)) return 0;
     if (!m->stale && !all_finite(v, INDICATORS)) return 0;
-    if (!all_finite(m->guess, NZ) || !all_finite(m->configuration_z, NZ)) return 0;
+    if (!all_finite(m->guess, NZ) || !all_finite(m->cut, NCUT)) return 0;
+    if (!all_finite(m->configuration_z, NZ)) return 0;
     if (!all_finite(m->configuration_x, NX) || !sane_inputs(m) || !sane_events(m)) return 0;
     if (!sane_watch(&m->watched)) return 0;
 #ifdef MODEL_TREE

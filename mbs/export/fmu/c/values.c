@@ -92,7 +92,7 @@ static int settable(const core *c, core_reference ref) {
     if (is_speed(ref)) return before;
     if (ref < PARAMETERS) return 0;
     if (ref < MODES) return MODEL_FIXED[ref] ? before : before | EVENT | STEP;
-    return among(ref, DEPENDENTS, INDICATORS) ? before : 0;
+    return among(ref, DEPENDENTS, INDICATORS) || ref >= CUTS ? before : 0;
 }
 
 /* Check the bounds of a parameter. The smallest normal number as lower bound means "positive". */
@@ -133,11 +133,12 @@ static void changed(core *c) {
         core_restart(c);
 }
 
-/* Store a guess of a dependent coordinate. A guess equal to the start value of the model
- * description has no effect, because many hosts set all start values. */
+/* Store a guess of a dependent coordinate or a cut joint. A guess equal to the start value of the
+ * model description has no effect, because many hosts set all start values. */
 static void set_guess(core *c, core_reference ref, double value) {
-    if (c->m.guess[ref - DEPENDENTS] == value) return;
-    c->m.guess[ref - DEPENDENTS] = value;
+    double *at = ref < CUTS ? c->m.guess + (ref - DEPENDENTS) : c->m.cut + (ref - CUTS);
+    if (*at == value) return;
+    *at = value;
     changed(c);
 }
 
@@ -178,7 +179,9 @@ core_status core_set(core *c, const core_reference *ref, size_t n, const double 
     for (i = 0; i < n; i++)
         if (settable_value(c, ref[i], values[i])) return CORE_ERROR;
     for (i = 0; i < n; i++) {
-        if (ref[i] >= SLOTS) {
+        if (ref[i] >= CUTS) {
+            set_guess(c, ref[i], values[i]);
+        } else if (ref[i] >= SLOTS) {
             set_slot(c, ref[i], values[i]);
         } else if (ref[i] >= DEPENDENTS) {
             set_guess(c, ref[i], values[i]);

@@ -1,8 +1,8 @@
-"""Inverse geometric model of many poses, by vectorised closed forms or the general method."""
+"""Draft of many poses: solutions of a vectorised closed form or the general method."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,19 +10,20 @@ from casadi import Function
 from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Arm, Array
-from mbs.closed_forms.arm_search import General, Polished, general_many, polish
+from mbs.closed_forms.arm_search import General, general_many, polish
 from mbs.closed_forms.sequence import StepSequence
 from mbs.models.inverse_geometry.branches import branch_labels
 from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.closed_form import (
     PoseBatch,
     at_poses,
+    bounds_of,
     plain_branches,
+    sequence_or_none,
 )
-from mbs.models.inverse_geometry.gathering import ILL_CONDITIONED, general_ready
+from mbs.models.inverse_geometry.draft import regular_general
+from mbs.models.inverse_geometry.solutions import ManySolutions
 from mbs.models.inverse_geometry.target import (
-    NEARLY_SINGULAR,
-    SINGULAR,
     SOLVED,
     Target,
     nearly_singular,
@@ -39,7 +40,7 @@ MANY = 1000
 takes (about one second)."""
 
 
-def batch(
+def evaluate_branches(
     chain: FrameChain, sequence: StepSequence, p: NDArray[np.float64], T: Array, r: Array
 ) -> PoseBatch:
     """Evaluate all branches of a closed form at N poses.
@@ -93,12 +94,9 @@ _DOUBTFUL = 1e-6
 configuration."""
 _EXACT = 1e-14
 """Residual, relative to max(1 m, arm length), that Newton's method hardly improves."""
-_SUSPECT = 1e-9
-"""Radicands and regularity (squared, dimensionless) above which the two roots of an equation are
-farther apart than 1e-5, for any singular value."""
 _DEGENERATE = 1e-12
 """Regularity (squared, dimensionless) below which a pose is solved by other methods. Above it the
-steps keep ten digits, and residuals reveal a larger loss. `gathering` uses a stricter limit for
+steps keep ten digits, and residuals reveal a larger loss. `draft` uses a stricter limit for
 single poses."""
 _FOLD = 1e-9
 """Largest negative radicand (dimensionless) of a root that is real up to rounding. The residual
@@ -114,31 +112,16 @@ _ALIKE = 12 * _MEETING
 `_MEETING`."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BranchSolutions:
-    """Solutions of N poses, with one column per branch.
-
-    Attributes:
-        q: (N, branches, n) joint positions of the chain [rad or m].
-        valid: (N, branches) whether the branch has a solution.
-        residual: (N, branches) largest absolute difference of an element from the target pose.
-        labels: names of the branches.
-        searched: (N,) whether the pose must be solved by other methods, because branches meet or a
-            joint is undetermined.
-    """
-
-    q: Array
-    valid: Booleans
-    residual: Array
-    labels: tuple[str, ...]
-    searched: Booleans
+# The results of this module are `ManySolutions` of a chain: q (N, branches, n) are its positions.
+# In `searched`, poses are marked that must be solved by other methods, because branches meet or a
+# joint is undetermined.
 
 
-def nothing(joints: int, count: int) -> BranchSolutions:
+def empty_draft(joints: int, count: int) -> ManySolutions:
     """Return an empty result of `count` poses, all marked for other methods."""
     shape = count, 0
     empty = np.empty((*shape, joints)), np.zeros(shape, dtype=bool), np.empty(shape)
-    return BranchSolutions(*empty, (), np.ones(count, dtype=bool))
+    return ManySolutions(*empty, (), np.ones(count, dtype=bool), np.zeros(count, dtype=bool))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,16 +150,15 @@ class ArmRows:
             return self.first
         return Arm(self.first.names, self.first.prismatic, self.gaps[k])
 
-    def polish(self, T: Array, rows: NDArray[np.intp], q: Array) -> Polished:
-        """Refine configurations q (m, n) of the poses with indices `rows` (m,)."""
+    def polish(self, T: Array, rows: NDArray[np.intp], q: Array) -> tuple[Array, Array]:
+        """Refine configurations q (m, n) of the poses with indices `rows` (m,); see `polish`."""
         if self.gaps is None:
             return polish(self.first, T[rows], q)
-        better = Polished(np.empty_like(q), np.empty(len(q)))
+        better, residual = np.empty_like(q), np.empty(len(q))
         for k in np.unique(rows):
             own = rows == k
-            found = polish(self.at(int(k)), T[k], q[own])
-            better.q[own], better.residual[own] = found.q, found.residual
-        return better
+            better[own], residual[own] = polish(self.at(int(k)), T[k], q[own])
+        return better, residual
 
     def nearly_singular(self, rows: NDArray[np.intp], q: Array, bound: float) -> Booleans:
         """Return (m,) whether each q (m, n), of pose `rows` (m,), is nearly singular."""
@@ -199,9 +181,9 @@ def arm_rows(chain: FrameChain, p: Array, r: Array) -> ArmRows:
     return ArmRows(Arm(chain.names, prismatic, gaps[0]), gaps)
 
 
-def draft_solutions(
+def closed_form_draft(
     chain: FrameChain, sequence: StepSequence, p: Array, T: Array, r: Array
-) -> BranchSolutions:
+) -> ManySolutions:
     """Solve N poses by a closed form.
 
     Args:
@@ -211,7 +193,7 @@ def draft_solutions(
         T: (N, 4, 4) poses [m].
         r: (N, k) positions of the varied joints of the chain [rad or m].
     """
-    every, arms = batch(chain, sequence, p, T, r), arm_rows(chain, p, r)
+    every, arms = evaluate_branches(chain, sequence, p, T, r), arm_rows(chain, p, r)
     arm, scale = arms.first, arms.scale
     close = every.residual <= _DOUBTFUL * scale
     doubtful = close & (every.residual > _EXACT * scale)
@@ -223,20 +205,8 @@ def draft_solutions(
     searched |= _merge(arm, every, valid)
     searched |= _next_to_singular(arms, every, valid, bounds_of(sequence))
     labels = branch_labels(chain, sequence, p)
-    return BranchSolutions(every.q, valid, every.residual, labels, searched)
-
-
-def bounds_of(sequence: StepSequence) -> tuple[float, float]:
-    """Return the bounds of the test for missing solutions near singular configurations.
-
-    Returns:
-        Value of `real` and `regular` above which the Jacobian is not checked, and singular value
-        below which solutions may be missing. Equations with two roots lose no solution until the
-        roots count as one. Quartics lose solutions as the general method does.
-    """
-    if any(step.kind == "quartic" for step in sequence.steps):
-        return np.inf, NEARLY_SINGULAR
-    return _SUSPECT, SINGULAR
+    undecided = np.zeros(len(T), dtype=bool)
+    return ManySolutions(every.q, valid, every.residual, labels, searched, undecided)
 
 
 def _next_to_singular(
@@ -255,9 +225,9 @@ def _next_to_singular(
 def _polish(arms: ArmRows, T: Array, every: PoseBatch, which: Booleans) -> Booleans:
     """Refine the configurations of mask `which` in place; return (m,) whether each moved far."""
     before = every.q[which]
-    better = arms.polish(T, np.nonzero(which)[0], before)
-    every.q[which], every.residual[which] = better.q, better.residual
-    moved = np.abs(arms.first.wrapped(better.q - before))
+    better, residual = arms.polish(T, np.nonzero(which)[0], before)
+    every.q[which], every.residual[which] = better, residual
+    moved = np.abs(arms.first.wrapped(better - before))
     far: Booleans = np.max(moved, axis=-1) > _MEETING
     return far
 
@@ -279,9 +249,7 @@ def _merge(arm: Arm, every: PoseBatch, valid: Booleans) -> Booleans:
     return meeting
 
 
-def with_configurations(
-    draft: BranchSolutions, k: int, arm: Arm, q: Array, T: Array
-) -> BranchSolutions:
+def replace_solutions(draft: ManySolutions, k: int, arm: Arm, q: Array, T: Array) -> ManySolutions:
     """Replace the solutions of one pose, each in the column of the nearest branch.
 
     Args:
@@ -299,7 +267,7 @@ def with_configurations(
     return draft
 
 
-def _widen(draft: BranchSolutions, columns: int) -> BranchSolutions:
+def _widen(draft: ManySolutions, columns: int) -> ManySolutions:
     """Append unused columns up to a minimum number of columns."""
     more = columns - draft.valid.shape[1]
     if more <= 0:
@@ -307,7 +275,8 @@ def _widen(draft: BranchSolutions, columns: int) -> BranchSolutions:
     rows = (0, 0), (0, more)
     q, valid = np.pad(draft.q, (*rows, (0, 0))), np.pad(draft.valid, rows)
     residual = np.pad(draft.residual, rows, constant_values=np.inf)
-    return BranchSolutions(q, valid, residual, draft.labels + ("",) * more, draft.searched)
+    labels = draft.labels + ("",) * more
+    return replace(draft, q=q, valid=valid, residual=residual, labels=labels)
 
 
 def _nearest_columns(arm: Arm, branches: Array, q: Array) -> list[int]:
@@ -324,13 +293,7 @@ def _nearest_columns(arm: Arm, branches: Array, q: Array) -> list[int]:
 # Solutions of the general method at many poses, and a mask of the poses that are not certified.
 
 
-def ready(chain: FrameChain, p: Array) -> General | None:
-    """Return the general method of a chain for p (np,), or None if it is ill-conditioned."""
-    found = general_ready(chain, p)
-    return found if found and found.prepared.regularity >= ILL_CONDITIONED else None
-
-
-def general_draft(general: General, T: Array) -> BranchSolutions:
+def general_draft(general: General, T: Array) -> ManySolutions:
     """Solve N poses by the general method; the order of columns has no meaning.
 
     Args:
@@ -349,18 +312,19 @@ def general_draft(general: General, T: Array) -> BranchSolutions:
     every[pose, column], valid[pose, column], residual[pose, column] = q, True, reached
     unsure = nearly_singular(arm, q) | (reached > target.tolerance)
     searched[pose[unsure]] = True
-    return BranchSolutions(every, valid, residual, ("",) * shape[1], searched)
+    undecided = np.zeros(len(T), dtype=bool)
+    return ManySolutions(every, valid, residual, ("",) * shape[1], searched, undecided)
 
 
-def general_draft_varied(chain: FrameChain, p: Array, T: Array, r: Array) -> BranchSolutions:
+def general_draft_varied(chain: FrameChain, p: Array, T: Array, r: Array) -> ManySolutions:
     """Solve N poses by the general method, with the varied joints at positions r (N, k).
 
     A separate arm is prepared for each distinct row of r.
     """
-    draft = nothing(len(chain.names), len(T))
+    draft = empty_draft(len(chain.names), len(T))
     positions, which = np.unique(r, axis=0, return_inverse=True)
     for number, position in enumerate(positions):
-        general = ready(chain.locked_at(position), p)
+        general = regular_general(chain.locked_at(position), p)
         if general is None:
             continue
         rows = np.flatnonzero(which.ravel() == number)
@@ -372,4 +336,26 @@ def general_draft_varied(chain: FrameChain, p: Array, T: Array, r: Array) -> Bra
     return draft
 
 
-# Public result and function for many poses.
+def many_draft(chain: FrameChain, method: str, p: Array, T: Array, r: Array) -> ManySolutions:
+    """Solve N poses by a closed form, else by the general method; others are marked as `searched`.
+
+    Args:
+        chain: chain that is solved for.
+        method: argument of `solve`.
+        p: (np,) parameter values.
+        T: (N, 4, 4) poses [m].
+        r: (N, k) positions of the varied joints of the chain [rad or m].
+
+    Raises:
+        NoClosedForm: method is "pieper" or "paul" and does not apply to the chain.
+    """
+    sequence = sequence_or_none(chain, method, p)
+    if sequence is not None:
+        return closed_form_draft(chain, sequence, p, T, r)
+    if method in ("auto", "general"):
+        if chain.varied:
+            return general_draft_varied(chain, p, T, r)
+        general = regular_general(chain, p)
+        if general is not None:
+            return general_draft(general, T)
+    return empty_draft(len(chain.names), len(T))

@@ -1,4 +1,4 @@
-"""Solver for single poses of a chain by a closed form or the general method."""
+"""Compiled draft of one pose: certified solutions of a closed form or the general method."""
 
 from __future__ import annotations
 
@@ -16,13 +16,18 @@ import mbs.closed_forms.arm_core as core
 from mbs.closed_forms.arm import Array
 from mbs.closed_forms.arm_search import General
 from mbs.closed_forms.sequence import StepSequence
-from mbs.errors import NoClosedForm
 from mbs.loops.pose import pose_numbers
 from mbs.models.inverse_geometry.branches import branch_labels
 from mbs.models.inverse_geometry.chain import FrameChain
-from mbs.models.inverse_geometry.closed_form import CLOSED_FORMS, plain_branches, sequence_of
-from mbs.models.inverse_geometry.gathering import ILL_CONDITIONED, closed_form_name, general_ready
-from mbs.models.inverse_geometry.many import MANY, bounds_of, draft_solutions, general_draft
+from mbs.models.inverse_geometry.closed_form import (
+    bounds_of,
+    closed_form_name,
+    plain_branches,
+    sequence_or_none,
+)
+from mbs.models.inverse_geometry.draft import regular_general
+from mbs.models.inverse_geometry.draft_many import MANY, closed_form_draft, general_draft
+from mbs.models.inverse_geometry.solutions import PoseDraft
 from mbs.models.inverse_geometry.target import NEARLY_SINGULAR
 from mbs.native._compiled import MachineCode, machine_code
 from mbs.native.array_calls import array_builtin
@@ -34,24 +39,6 @@ _CANDIDATES = 144
 """Maximum number of configurations of the general method for one pose: ROTH_CONFIGURATIONS in C."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PoseDraft:
-    """Solutions of a chain for one pose.
-
-    Attributes:
-        q: (m, n) joint positions of the chain [rad or m], angles in (-pi, pi].
-        residual: (m,) largest absolute difference of an element from the target pose.
-        branch: (m,) indices of the branches.
-        certain: whether the list is complete and without copies; False near a singular
-            configuration.
-    """
-
-    q: Array
-    residual: Array
-    branch: NDArray[np.int64]
-    certain: bool
-
-
 class PoseKernel:
     """Solver for single poses of a chain with numeric parameters.
 
@@ -61,6 +48,8 @@ class PoseKernel:
         arm: numeric geometry of the chain.
         method: "pieper", "paul" or "general".
         labels: names of the branches; "1", "2", ... for the general method.
+        names: the same by index of the branch, which compiled code returns as a double: doubles are
+            equal to integers as keys.
     """
 
     def __init__(
@@ -73,6 +62,7 @@ class PoseKernel:
             self.labels = tuple(str(k + 1) for k in range(_CANDIDATES))
         else:
             self.labels = branch_labels(chain, solves, p)
+        self.names = dict(enumerate(self.labels))
         self._handed = core.handed_of(self.arm)
         self._lock = threading.Lock()
         self._code: _PoseCode | None = None
@@ -120,7 +110,10 @@ class PoseKernel:
             return None
         m = int(count)
         own = q.T[:m] if self._plain else q.T[:m, self._indices]
-        return PoseDraft(own, residual[:m], branch[:m].astype(int), state == CERTAIN)
+        return self._draft(own, residual[:m], branch[:m], state == CERTAIN)
+
+    def _draft(self, q: Array, residual: Array, branch: NDArray[Any], certain: bool) -> PoseDraft:
+        return PoseDraft(q, residual, self.names, branch, certain, self.method)
 
     def _by_arrays(self, T: Array) -> PoseDraft:
         """Solve a rigid transform T (4, 4) without machine code of the closed form."""
@@ -130,11 +123,11 @@ class PoseKernel:
         if isinstance(self._solves, General):
             draft = general_draft(self._solves, T[None])
         else:
-            draft = draft_solutions(self.chain, self._solves, self.p, T[None], np.zeros((1, 0)))
+            draft = closed_form_draft(self.chain, self._solves, self.p, T[None], np.zeros((1, 0)))
         valid = np.flatnonzero(draft.valid[0])
         q = draft.q[0, valid]
         turned = np.where(self.arm.prismatic | (np.abs(q) <= np.pi), q, self.arm.wrapped(q))
-        return PoseDraft(turned, draft.residual[0, valid], valid, not draft.searched[0])
+        return self._draft(turned, draft.residual[0, valid], valid, not draft.searched[0])
 
     def _settled(self, library: ctypes.CDLL, T: Array, sequence: StepSequence) -> PoseDraft:
         """Evaluate the closed form by the CasADi interpreter, then refine by the compiled core."""
@@ -144,8 +137,7 @@ class PoseKernel:
             every = self._buffers.values(T)
         handed = self._handed
         found = core.settled_by(library, handed, T, every, bounds_of(sequence))
-        own, residual, branch, certain = found
-        return PoseDraft(own, residual, branch.astype(int), certain)
+        return self._draft(*found)
 
 
 class _Buffers:
@@ -186,17 +178,11 @@ def kernel_of(chain: FrameChain, p: Array, method: str = "auto") -> PoseKernel |
     """
 
     def made() -> PoseKernel | None:
-        if method in (*CLOSED_FORMS, "auto"):
-            try:
-                sequence = sequence_of(chain, method, p)
-                return PoseKernel(chain, p, closed_form_name(chain, sequence, p), sequence)
-            except NoClosedForm:
-                if method != "auto":
-                    raise
-        ready = None if method == "search" else general_ready(chain, p)
-        if ready is None or ready.prepared.regularity < ILL_CONDITIONED:
-            return None
-        return PoseKernel(chain, p, "general", ready)
+        sequence = sequence_or_none(chain, method, p)
+        if sequence is not None:
+            return PoseKernel(chain, p, closed_form_name(chain, sequence, p), sequence)
+        general = None if method == "search" else regular_general(chain, p)
+        return None if general is None else PoseKernel(chain, p, "general", general)
 
     kernel: PoseKernel | None = chain.system.cached(
         ("pose kernel", method, *chain.key, p.tobytes()), made

@@ -1,8 +1,7 @@
-"""Candidate solutions of a pose from closed forms, the general method and the search."""
+"""Draft of one pose: solutions of a closed form, the general method or a search, with copies."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import casadi
@@ -24,10 +23,12 @@ from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.chain import FrameChain
 from mbs.models.inverse_geometry.closed_form import (
     CLOSED_FORMS,
+    closed_form_name,
     given_of,
     require_method,
-    sequence_of,
+    sequence_or_none,
 )
+from mbs.models.inverse_geometry.solutions import PoseDraft
 from mbs.models.inverse_geometry.target import SINGULAR, Target
 from mbs.numbers import NONZERO
 
@@ -42,40 +43,21 @@ _DEGENERATE = 1e-5
 5 of 16 digits in the square and half as many in the angle."""
 EXACT = 2e-15
 """Residual, relative to max(1 m, arm length), that is a rounding error of the forward model."""
-ILL_CONDITIONED = 1e-9
+_ILL_CONDITIONED = 1e-9
 """Regularity of the general method below which it may miss solutions: a simple root has seven
 correct digits there, a double root three."""
 NOT_VARIED = np.zeros(0)
 """Positions of the varied joints of a chain that has none."""
 _STARTS = 300
+"""Starts of the search. The rarest of the sixteen configurations of the arm of Manseur and Doty is
+reached from every thirtieth start, so that 300 starts miss it with a probability of 4e-5."""
 _KEPT = 256
 """Maximum number of cached arms, one per position of locked joints, tens of kilobytes each."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Gathered:
-    """Solutions from one or several methods, possibly with copies.
-
-    Attributes:
-        q: (m, n) configurations [rad or m].
-        labels: name of the closed-form branch of each solution, "" without a branch.
-        method: name of the method.
-        doubtful: whether solutions may be missing, because the pose is near a degenerate case of
-            the method.
-        near: (k, n) configurations with a small residual that Newton's method did not improve to
-            solutions. They are starts of a search along a valley.
-    """
-
-    q: Array
-    labels: tuple[str, ...]
-    method: str
-    doubtful: bool
-    near: Array | None = None
-
-
-def gather(
+def pose_draft(
     chain: FrameChain, target: Target, method: str, p: Array, r: Array = NOT_VARIED
-) -> Gathered:
+) -> PoseDraft:
     """Compute solutions by one method, or by the first method that applies to the chain.
 
     Args:
@@ -91,14 +73,11 @@ def gather(
         ModelError: the method is unknown or does not apply to the chain.
     """
     require_method(chain.system, method, METHODS)
-    if method in (*CLOSED_FORMS, "auto"):
-        try:
-            return _by_closed_form(chain, target, sequence_of(chain, method, p), p, r)
-        except NoClosedForm:
-            if method != "auto":
-                raise
+    sequence = sequence_or_none(chain, method, p)
+    if sequence is not None:
+        return _by_closed_form(chain, target, sequence, p, r)
     if method == "search":
-        return by_search(target)
+        return search_draft(target)
     ready = general_ready(chain.locked_at(r) if chain.varied else chain, p)
     if ready is None and method == "general":
         raise ModelError(
@@ -106,21 +85,23 @@ def gather(
             f" {', '.join(chain.names)}: it is for six joints, and not for all with prismatic ones;"
             " use method='search'"
         )
-    return by_search(target) if ready is None else _by_general(target, ready)
+    return search_draft(target) if ready is None else _by_general(target, ready)
 
 
-def gather_further(chain: FrameChain, target: Target, gathered: Gathered, p: Array) -> Gathered:
+def extend_draft(chain: FrameChain, target: Target, draft: PoseDraft, p: Array) -> PoseDraft:
     """Add the solutions of the general method and the solutions along valleys."""
     ready = general_ready(chain, p)
-    if gathered.method not in ("general", "search") and ready is not None:
-        gathered = joined(gathered, _by_general(target, ready))
-    return along_valleys(target, gathered)
+    if draft.method not in ("general", "search") and ready is not None:
+        draft = join_drafts(draft, _by_general(target, ready))
+    return _add_valley_solutions(target, draft)
 
 
-def joined(gathered: Gathered, more: Gathered) -> Gathered:
-    """Return the union of two results, marked as not doubtful."""
-    q, labels = np.concatenate([gathered.q, more.q]), gathered.labels + more.labels
-    return Gathered(q, labels, gathered.method, False, gathered.near)
+def join_drafts(draft: PoseDraft, more: PoseDraft) -> PoseDraft:
+    """Return the union of two drafts, marked as certain."""
+    q = np.concatenate([draft.q, more.q])
+    residual = np.concatenate([draft.residual, more.residual])
+    labels = draft.labels + more.labels
+    return PoseDraft(q, residual, labels, None, True, draft.method, draft.near)
 
 
 # Solutions at the far end of a valley of the residual. Near a singular configuration with a
@@ -140,22 +121,21 @@ _STEPS_ALONG = 32  # number of steps along a valley, a full revolution
 _CROSSINGS = 8  # iterations of false position; along a sine each doubles the number of digits
 
 
-def along_valleys(target: Target, gathered: Gathered) -> Gathered:
+def _add_valley_solutions(target: Target, draft: PoseDraft) -> PoseDraft:
     """Add the solutions along the valleys that start at singular solutions."""
     if target.arm.size != 6:
-        return gathered
-    s = target.singular_values(gathered.q) if len(gathered.q) else np.zeros((0, 6))
+        return draft
+    s = target.singular_values(draft.q) if len(draft.q) else np.zeros((0, 6))
     singular, twice = s[:, -1] < SINGULAR, s[:, -2] < SINGULAR
-    starts = [gathered.q[singular], np.zeros((0, 6)) if gathered.near is None else gathered.near]
+    starts = [draft.q[singular], np.zeros((0, 6)) if draft.near is None else draft.near]
     start = np.concatenate(starts) / target.unit
     found = _far_ends(target, start) if len(start) else []
     if np.any(twice):
-        found += _around(target, gathered.q[twice] / target.unit)
+        found += _around(target, draft.q[twice] / target.unit)
     if not found:
-        return gathered
+        return draft
     q = wrapped(target.arm, np.concatenate(found) * target.unit)
-    q = q[target.residual(q) < target.tolerance]
-    return joined(gathered, Gathered(q, ("",) * len(q), "", False))
+    return join_drafts(draft, _solutions_among(target, q))
 
 
 def _far_ends(target: Target, start: Array) -> list[Array]:
@@ -178,10 +158,10 @@ def _far_ends(target: Target, start: Array) -> list[Array]:
     return found
 
 
-_FEW_ENDS = 4
+_FEW_ENDS = 4  # minima of a singular value along a self-motion from which valleys start
 
 
-def beside(target: Target, x: Array) -> Gathered:
+def valley_draft(target: Target, x: Array) -> PoseDraft:
     """Find solutions along the valleys that branch off a self-motion with samples x (k, 6).
 
     Valleys start at minima of the second smallest singular value, where another motion of the arm
@@ -198,8 +178,21 @@ def beside(target: Target, x: Array) -> Gathered:
             found = _far_ends(target, np.concatenate([x[lowest] + steps, x[lowest] - steps]))
     if found:
         q = wrapped(target.arm, np.concatenate(found) * target.unit)
-        q = q[target.residual(q) < target.tolerance]
-    return Gathered(q, ("",) * len(q), "", False)
+    return _solutions_among(target, q)
+
+
+def _solutions_among(target: Target, q: Array) -> PoseDraft:
+    """Return the configurations q (m, n) that reach the pose."""
+    residual = target.residual(q) if len(q) else np.zeros(0)
+    reached = residual < target.tolerance
+    return _draft(q[reached], residual[reached])
+
+
+def _draft(
+    q: Array, residual: Array, method: str = "", certain: bool = True, near: Array | None = None
+) -> PoseDraft:
+    """Return a draft without branch names."""
+    return PoseDraft(q, residual, ("",) * len(q), None, certain, method, near)
 
 
 _REACH = 5  # number of steps along a valley, one radian in total
@@ -345,15 +338,13 @@ def _where(which: NDArray[np.bool_], yes: Array, no: Array) -> Array:
 
 def _by_closed_form(
     chain: FrameChain, target: Target, sequence: StepSequence, p: Array, r: Array
-) -> Gathered:
+) -> PoseDraft:
     q, regular = (np.array(part).T for part in _leaves(chain, sequence, p)(DM(target.T), DM(r)))
     error = target.residual(q)
     near = np.flatnonzero(error < _BRANCH_NEAR * max(1.0, target.arm.length))
-    doubtful = bool(np.min(regular) < _DEGENERATE)
+    certain = not np.min(regular) < _DEGENERATE
     labels = tuple(sequence.label(int(b)) for b in near)
-    return _polish(
-        target, Gathered(q[near], labels, closed_form_name(chain, sequence, p), doubtful)
-    )
+    return _polish(target, q[near], labels, closed_form_name(chain, sequence, p), certain)
 
 
 def _leaves(chain: FrameChain, sequence: StepSequence, p: Array) -> Function:
@@ -375,41 +366,43 @@ def _leaves(chain: FrameChain, sequence: StepSequence, p: Array) -> Function:
     return function
 
 
-def closed_form_name(chain: FrameChain, sequence: StepSequence, p: Array) -> str:
-    """Return the name of the closed form of a sequence: "pieper" or "paul"."""
-    try:
-        return "pieper" if sequence is sequence_of(chain, "pieper", p) else "paul"
-    except NoClosedForm:
-        return "paul"
-
-
-def _by_general(target: Target, ready: General) -> Gathered:
+def _by_general(target: Target, ready: General) -> PoseDraft:
     q = general(ready, target.T)
-    doubtful = ready.prepared.regularity < ILL_CONDITIONED
-    return _polish(target, Gathered(q, ("",) * len(q), "general", doubtful))
+    certain = not ready.prepared.regularity < _ILL_CONDITIONED
+    return _polish(target, q, ("",) * len(q), "general", certain)
 
 
-def by_search(target: Target) -> Gathered:
+def search_draft(target: Target) -> PoseDraft:
     """Compute solutions by a search from many starts."""
     q = search(target.arm, target.T, _STARTS)
-    return _polish(target, Gathered(q, ("",) * len(q), "search", False))
+    return _polish(target, q, ("",) * len(q), "search", True)
 
 
-def _polish(target: Target, gathered: Gathered) -> Gathered:
-    """Refine candidates by Newton's method and keep the solutions."""
-    if not len(gathered.q):
-        return gathered
-    own = target.residual(gathered.q)
-    better = polish(target.arm, target.T, gathered.q)
+def _polish(
+    target: Target, candidates: Array, labels: tuple[str, ...], method: str, certain: bool
+) -> PoseDraft:
+    """Refine candidates (m, n) by Newton's method and return those that reach the pose.
+
+    Args:
+        target: target pose of the arm.
+        candidates: (m, n) configurations [rad or m].
+        labels: name of the closed-form branch of each, "" without a branch.
+        method: name of the method that computed them.
+        certain: whether none is missing.
+    """
+    if not len(candidates):
+        return _draft(candidates, np.zeros(0), method, certain)
+    own = target.residual(candidates)
+    better, residual = polish(target.arm, target.T, candidates)
     # keep candidates with rounding errors only: near two singularities the closed form is exact,
     # and Newton's method diverges along a valley
     exact = own <= EXACT * max(1.0, target.arm.length)
-    q = np.where(exact[:, None], gathered.q, better.q)
-    reached = exact | (better.residual < target.tolerance)
+    q, residual = np.where(exact[:, None], candidates, better), np.where(exact, own, residual)
+    reached = exact | (residual < target.tolerance)
     solved = np.flatnonzero(reached)
-    labels = tuple(gathered.labels[k] for k in solved)
-    near = gathered.q[~reached & (own < _NEARLY_MOVES * max(1.0, target.arm.length))]
-    return Gathered(q[solved], labels, gathered.method, gathered.doubtful, near)
+    names = tuple(labels[k] for k in solved)
+    near = candidates[~reached & (own < _NEARLY_MOVES * max(1.0, target.arm.length))]
+    return PoseDraft(q[solved], residual[solved], names, None, certain, method, near)
 
 
 def general_ready(chain: FrameChain, p: Array) -> General | None:
@@ -424,3 +417,9 @@ def general_ready(chain: FrameChain, p: Array) -> General | None:
     key = (*chain.key, p.tobytes())
     ready: General | None = chain.system.recent("general", key, build, _KEPT)
     return ready
+
+
+def regular_general(chain: FrameChain, p: Array) -> General | None:
+    """Return the general method of a chain for p (np,), or None if it is ill-conditioned."""
+    found = general_ready(chain, p)
+    return found if found and found.prepared.regularity >= _ILL_CONDITIONED else None

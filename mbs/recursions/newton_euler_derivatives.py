@@ -609,8 +609,8 @@ def _set_pairs(
 ) -> None:
     """Set the entries of `result` for velocity k and an ancestor joint, in place.
 
-    Both triangles are set. `start` is the index of the first velocity of the ancestor joint, `lines`
-    are its unit motions, and `column` has the derivatives by velocity k in the same axes.
+    Both triangles are set. `start` is the index of the first velocity of the ancestor joint,
+    `lines` are its unit motions, and `column` has the derivatives by velocity k in the same axes.
     """
     _set_own(result, k, start, lines, column)
     for h, line in enumerate(lines, start):

@@ -26,6 +26,8 @@ FAST := tests/assembly tests/components tests/formats tests/operations \
     tests/recursions tests/spatial tests/test_expressions.py tests/structure/test_class_names.py \
     tests/structure/test_number_reasons.py tests/view
 
+C_FILES := $(wildcard mbs/core/source/*.[ch] mbs/export/c/*.c mbs/export/fmu/c/*.[ch] mbs/native/runtime/*.[ch])
+
 INSTALL := $(RUN)/python -m pip install --quiet --disable-pip-version-check --editable
 
 LOWEST := build/lowest/bin/python
@@ -41,7 +43,7 @@ help:
 	@echo "make test-lowest  the tests with the lowest versions that pyproject.toml allows, in build/lowest; Python 3.11 or 3.12"
 	@echo "make kernels  the tests of numerical subjects as other processors compute; SETTINGS names some"
 	@echo "make kernels-short  a part of them under one kernel"
-	@echo "make lint     ruff: style and format"
+	@echo "make lint     ruff and clang-format: style and format"
 	@echo "make types    mypy, strict"
 	@echo "make layers   import-linter: no module imports a higher layer"
 	@echo "make docs     build the documentation into build/docs; a warning is an error"
@@ -88,6 +90,7 @@ kernels-short: $(VENV)/.dev
 lint: $(VENV)/.dev
 	@$(RUN)/ruff check .
 	@$(RUN)/ruff format --check .
+	@$(RUN)/clang-format --dry-run --Werror $(C_FILES)
 
 types: $(VENV)/.dev
 	@$(RUN)/mypy

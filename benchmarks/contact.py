@@ -70,7 +70,7 @@ class Ours:
         self.x0 = np.concatenate(
             [*configuration(system, start(HEIGHT), None, None), system.z_start]
         )
-        self.events, (rhs, project, _) = with_crossings(state, self.x0, (0.0, DURATION), None, ())
+        self.events, (rhs, project, _) = with_crossings(state, self.x0, (0.0, DURATION), (), ())
         self.functions = equations(rhs, project, method, self.events)
         self.code = IntegrationCode(self.functions, may_compile=True)
         if not self.code.compile():

@@ -103,12 +103,11 @@ def value_kinds(options: type) -> dict[str, ValueKind]:
         options: dataclass of the options.
     """
     hints, known = get_type_hints(options), option_fields(options)
-    kinds = {name: _value_kind(hints[name], option) for name, (_, option) in known.items()}
+    kinds = {name: _kind(hints[name], option) for name, (_, option) in known.items()}
     return {name: kind for name, kind in kinds.items() if kind is not None}
 
 
-def _value_kind(hint: Any, option: OptionInfo) -> ValueKind | None:
-    """Return the kind of values of an option with the type `hint`; None for other types."""
+def _kind(hint: Any, option: OptionInfo) -> ValueKind | None:
     types = get_args(hint) if isinstance(hint, UnionType) else (hint,)
     if bool in types:
         return "flag"

@@ -12,7 +12,7 @@ from casadi import SX
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.model_function import require_system
 from mbs.assembly.system import System
-from mbs.assembly.tables import AttachedSensor, JointRow
+from mbs.assembly.tables import JointRow
 from mbs.assembly.tree import Frame, Link, Tree
 from mbs.components.joints import Motion
 from mbs.errors import ModelError
@@ -89,12 +89,17 @@ class Adjustable:
 
 
 def adjustables(system: System) -> list[Adjustable]:
-    """Return all numbers that may become symbols: links in order, cut joints, gravity."""
-    rows = [row for j, link in enumerate(system.tree.links) for row in _of_link(j, link)]
-    return [*rows, *_of_cuts(system), *_of_gravity(system)]
+    """Return all numbers of a system that may become symbols: links in order, cut joints, gravity.
+
+    Args:
+        system: open or closed system.
+    """
+    rows = [row for j, link in enumerate(system.tree.links) for row in _numbers_of_link(j, link)]
+    return [*rows, *_numbers_of_cuts(system), *_numbers_of_gravity(system)]
 
 
-def _of_link(j: int, link: Link) -> Iterator[Adjustable]:
+def _numbers_of_link(j: int, link: Link) -> Iterator[Adjustable]:
+    """Yield the numbers of link j (index from 0) and of the fixed frames on the path to it."""
     for k, frame in enumerate(link.via):
         label = f"{j + 1}_{k + 1}"
         for kind, value in zip(PLACEMENT, frame.parameters, strict=True):
@@ -114,7 +119,8 @@ def _of_link(j: int, link: Link) -> Iterator[Adjustable]:
         yield Adjustable(f"{kind}{j + 1}", kind, ("link", j), value, unit, f"{text} ({link.name})")
 
 
-def _of_cuts(system: System) -> Iterator[Adjustable]:
+def _numbers_of_cuts(system: System) -> Iterator[Adjustable]:
+    """Yield the positions of the frames of cut joints, which may become symbols."""
     for cut in system.cuts:
         joint = cut.edge.joint.name
         for side, (_, pose) in zip("ab", cut.frames, strict=True):
@@ -124,7 +130,8 @@ def _of_cuts(system: System) -> Iterator[Adjustable]:
                 yield Adjustable(name, axis, (joint, side), pose.p[row], "m", text)
 
 
-def _of_gravity(system: System) -> Iterator[Adjustable]:
+def _numbers_of_gravity(system: System) -> Iterator[Adjustable]:
+    """Yield the three components of gravity, which may become symbols."""
     for row, axis in enumerate("xyz"):
         text = f"{axis} of the gravity acceleration in the base frame"
         value = system.tree.gravity[row]
@@ -175,10 +182,14 @@ def symbolic(system: System, what: Sequence[str]) -> System:
             )
     symbols = {row.name: SX.sym(row.name) for row in rows}
     parameters = [Parameter(r.name, float(r.value), r.unit, r.description) for r in rows]
-    return _with(system, rows, symbols, parameters)
+    return _with_symbols(system, rows, symbols, parameters)
 
 
 def _names(system: System, what: Sequence[str]) -> list[str]:
+    """Return the requested names `what`, a name or a list of names, as a list.
+
+    Raises ModelError for another type or repeated names.
+    """
     if not isinstance(what, (str, list, tuple)):
         raise ModelError(
             f"{system.name}: what is to be symbols is {quoted(what)}; give names such as"
@@ -205,21 +216,26 @@ def _choose(system: System, names: Sequence[str]) -> list[Adjustable]:
             _check_number(system, single[name])
             found = [single[name]]
         else:
-            found = _of_body(system, rows, name)
+            found = _numbers_of_body(system, rows, name)
         needed |= dict.fromkeys(row.name for row in found if not _is_itself(row, own))
     return [row for row in rows if row.name in needed]
 
 
 def _is_number(row: Adjustable) -> bool:
+    """Whether the value of the adjustable `row` is a number and not an expression."""
     return bool(row.value.is_constant())
 
 
 def _is_itself(row: Adjustable, parameters: set[str]) -> bool:
-    """Return whether the value is already the symbol of that name."""
+    """Whether the value is already the symbol with the name of the adjustable.
+
+    `parameters` are the names of the parameters of the system.
+    """
     return row.name in parameters and row.value.is_symbolic() and row.value.name() == row.name
 
 
 def _check_number(system: System, row: Adjustable) -> None:
+    """Raise ModelError if the value of the adjustable `row` is an expression of other symbols."""
     own = {parameter.name for parameter in system.parameters}
     if not _is_number(row) and not _is_itself(row, own):
         names = ", ".join(dict.fromkeys(s.name() for s in casadi.symvar(row.value)))
@@ -228,8 +244,13 @@ def _check_number(system: System, row: Adjustable) -> None:
         )
 
 
-def _of_body(system: System, rows: Sequence[Adjustable], name: str) -> list[Adjustable]:
-    """Return the ten inertial parameters of the link of a body that are no symbols."""
+def _numbers_of_body(system: System, rows: Sequence[Adjustable], name: str) -> list[Adjustable]:
+    """Return the ten inertial parameters of the link of the body `name` that are not symbols yet.
+
+    Raises ModelError if there is no such body, or if its link has further bodies with mass.
+
+    `rows` are the numbers of the system that may become symbols.
+    """
     links = {body.name: body.link for body in system.bodies}
     if name not in links:
         known = [*GROUPS, *links, *(row.name for row in rows)]
@@ -248,7 +269,10 @@ def _of_body(system: System, rows: Sequence[Adjustable], name: str) -> list[Adju
 
 
 def _check_welds(system: System, rows: Sequence[Adjustable]) -> None:
-    """Raise if Fixed joints carry all bodies of a link with inertial symbols."""
+    """Raise ModelError if all bodies of a link with inertial symbols are carried by Fixed joints.
+
+    `rows` are the numbers that become symbols.
+    """
     for number in sorted({int(r.owner[1]) for r in rows if r.kind in TEN_PARAMETERS}):
         carriers = [j for j in system.joints if j.part is not None and j.frame_b[0] == number]
         bodies = [body.name for body in system.bodies if body.link == number + 1]
@@ -261,13 +285,13 @@ def _check_welds(system: System, rows: Sequence[Adjustable]) -> None:
             )
 
 
-def _with(
+def _with_symbols(
     system: System,
     rows: Sequence[Adjustable],
     symbols: _Symbols,
     parameters: Sequence[Parameter],
 ) -> System:
-    """Return the system with symbols instead of the numbers."""
+    """Return the system with `symbols` instead of the numbers `rows`, and further `parameters`."""
     given: dict[tuple[str, int | str], dict[str, SX]] = {}
     for row in rows:
         given.setdefault(row.owner, {})[row.kind] = symbols[row.name]
@@ -295,6 +319,7 @@ def _with(
 
 
 def _link(j: int, link: Link, given: _Given) -> Link:
+    """Return link j (index from 0) with the symbols in `given` instead of its numbers."""
     via = tuple(
         _frame(frame, given.get(("fixed frame", f"{j + 1}_{k}"), {}))
         for k, frame in enumerate(link.via, 1)
@@ -311,24 +336,20 @@ def _link(j: int, link: Link, given: _Given) -> Link:
 
 
 def _frame(frame: Khalil, values: _Symbols) -> Khalil:
+    """Return the Khalil frame with the symbols in `values` (by kind) instead of its numbers."""
     six = zip(PLACEMENT, frame.parameters, strict=True)
     return Khalil(*(values.get(kind, old) for kind, old in six)) if values else frame
 
 
 def _with_position(pose: Pose, values: _Symbols) -> Pose:
+    """Return the pose with the symbols in `values` (keys x, y, z) instead of its position."""
     if not values:
         return pose
     return pose.at(casadi.vertcat(*(values.get(k, pose.p[i]) for i, k in enumerate("xyz"))))
 
 
-def _sensor(sensor: AttachedSensor, joints: Sequence[JointRow]) -> AttachedSensor:
-    if sensor.joint is None:
-        return sensor
-    joint = joints[sensor.joint]
-    return replace(sensor, frames=(joint.frame_a, joint.frame_b))
-
-
 def _cut(cut: Cut, given: _Given) -> Cut:
+    """Return the cut joint with the symbols in `given` instead of the positions of its frames."""
     name = cut.edge.joint.name
     return replace(
         cut,
@@ -338,8 +359,15 @@ def _cut(cut: Cut, given: _Given) -> Cut:
 
 
 def _joint(row: JointRow, cuts: Sequence[Cut], given: _Given) -> JointRow:
-    """Return the row of a joint, with its frames at the changed positions of the cut joint."""
-    moves = [m for cut in cuts if cut.edge.joint.name == row.name for m in _moves(cut, given)]
+    """Return the row of a joint with its frames at the changed positions of its cut joint.
+
+    The row is unchanged if it has no cut joint with symbols.
+
+    `given` maps (joint, side) to the symbols of the positions of its frames.
+    """
+    moves = [
+        m for cut in cuts if cut.edge.joint.name == row.name for m in _moved_frames(cut, given)
+    ]
     if not moves:
         return row
 
@@ -349,7 +377,7 @@ def _joint(row: JointRow, cuts: Sequence[Cut], given: _Given) -> JointRow:
     return replace(row, frame_a=frame(row.frame_a), frame_b=frame(row.frame_b))
 
 
-def _moves(cut: Cut, given: _Given) -> Iterator[tuple[Frame, Frame]]:
+def _moved_frames(cut: Cut, given: _Given) -> Iterator[tuple[Frame, Frame]]:
     """Yield each frame of a cut joint with symbols, before and after the substitution."""
     for side, (link, pose) in zip("ab", cut.frames, strict=True):
         values = given.get((cut.edge.joint.name, side), {})
@@ -358,5 +386,6 @@ def _moves(cut: Cut, given: _Given) -> Iterator[tuple[Frame, Frame]]:
 
 
 def _is_same(one: Frame, other: Frame) -> bool:
+    """Whether two frames are on the same link and have equal poses."""
     same = casadi.is_equal(one[1].matrix, other[1].matrix, 3)
     return one[0] == other[0] and bool(same)

@@ -27,7 +27,12 @@ _MOST_NAMES = 3
 
 @dataclass(frozen=True, slots=True)
 class ConnectionNode:
-    """Rigid link: number (0 for the base) and names of the bodies, one per line."""
+    """Rigid link in a diagram.
+
+    Attributes:
+        number: number of the link, 0 for the base.
+        lines: names of its bodies, one per line of text.
+    """
 
     number: int
     lines: tuple[str, ...]
@@ -70,9 +75,12 @@ class Connections:
 
 
 def connections(system: SystemData) -> Connections:
-    """Return the connection graph of a system.
+    """Return the connection graph of a system: rigid links and the joints between them.
 
     Fixed joints are no edges, because the bodies that they join are one link.
+
+    Args:
+        system: assembled system.
     """
     edges = [_edge(system, k) for k, row in enumerate(system.joints) if row.part is None]
     edges = [edge for edge in edges if edge.ends[0] != edge.ends[1]]
@@ -95,6 +103,7 @@ def connections(system: SystemData) -> Connections:
 
 
 def _edge(system: SystemData, k: int) -> ConnectionEdge:
+    """Return joint k of the system as an edge of the graph."""
     row = system.joints[k]
     speeds = (*system.speeds, *system.cut_coordinates)
     driven = any(speed.actuated for speed in speeds if speed.joint == row.name)
@@ -103,6 +112,7 @@ def _edge(system: SystemData, k: int) -> ConnectionEdge:
 
 
 def _names(system: SystemData, number: int) -> tuple[str, ...]:
+    """Return the lines of text of link `number`: names of its bodies, at most three lines."""
     if number == 0:
         return ("base",)
     names = [body.name for body in system.bodies if body.link == number]
@@ -112,6 +122,7 @@ def _names(system: SystemData, number: int) -> tuple[str, ...]:
 
 
 def _remarks(system: SystemData) -> tuple[str, ...]:
+    """Return a sentence for each coupling of coordinates."""
     return tuple(
         f"{loop.name}: {followed(loop.joints)}"
         for loop in system.loops
@@ -139,7 +150,13 @@ _LONGEST = 8
 
 @dataclass(frozen=True, slots=True)
 class PlacedNode:
-    """Link with the middle and size of its box [px]."""
+    """Link with position and size of its box.
+
+    Attributes:
+        node: the link.
+        x, y: middle of the box [px], y downwards.
+        width, height: size of the box [px].
+    """
 
     node: ConnectionNode
     x: float
@@ -150,7 +167,13 @@ class PlacedNode:
 
 @dataclass(frozen=True, slots=True)
 class PlacedEdge:
-    """Joint with the middle and width of its label [px], below or next to its first link."""
+    """Joint with the position of its label, below or next to its first link.
+
+    Attributes:
+        edge: the joint.
+        x, y: middle of the label [px], y downwards.
+        width: width of the label [px].
+    """
 
     edge: ConnectionEdge
     x: float
@@ -160,9 +183,14 @@ class PlacedEdge:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Positions of links, tree joints and cut joints, and size of the picture [px].
+    """Positions of links and joints in a diagram.
 
-    ancestors: dict from link number to the numbers of the links between it and the base.
+    Attributes:
+        nodes: dict from link number to box.
+        tree: labels of the joints of the spanning tree.
+        cuts: labels of the cut joints.
+        ancestors: dict from link number to the numbers of the links between it and the base.
+        width, height: size of the picture [px].
     """
 
     nodes: dict[int, PlacedNode]
@@ -174,9 +202,13 @@ class Layout:
 
 
 def layout(graph: Connections) -> Layout:
-    """Compute the layout of a connection graph."""
-    hung = _hang(graph)
-    draft = _DiagramSoFar(graph, hung, {}, [], [], {})
+    """Return the positions of all boxes and labels of a connection graph.
+
+    Args:
+        graph: links and joints.
+    """
+    hung = _cuts_below(graph)
+    draft = _Layout(graph, hung, {}, [], [], {})
     chain = _chain(graph) if not graph.cuts else []
     if len(chain) > _LONGEST + 1:
         draft.wrap(chain)
@@ -191,7 +223,7 @@ def layout(graph: Connections) -> Layout:
 
 
 def _chain(graph: Connections) -> list[int]:
-    """Return the link numbers of an unbranched chain in order, or an empty list."""
+    """Return the link numbers of `graph` in order if it is one unbranched chain, else []."""
     here, found = 0, [0]
     while graph.children[here]:
         if len(graph.children[here]) > 1:
@@ -201,8 +233,8 @@ def _chain(graph: Connections) -> list[int]:
     return found
 
 
-def _hang(graph: Connections) -> dict[int, tuple[ConnectionEdge, ...]]:
-    """Return for each link the cut joints to draw below it.
+def _cuts_below(graph: Connections) -> dict[int, tuple[ConnectionEdge, ...]]:
+    """Return for each link number of `graph` the cut joints to draw below it.
 
     A cut joint is drawn below the end link with fewer cut joints, and not below the base if
     possible.
@@ -220,6 +252,7 @@ def _hang(graph: Connections) -> dict[int, tuple[ConnectionEdge, ...]]:
 
 
 def _depths(graph: Connections) -> dict[int, int]:
+    """Return the number of joints between the base and each link, by link number."""
     depth = dict.fromkeys(graph.nodes, 0)
     waiting = [0]
     for here in waiting:
@@ -230,23 +263,32 @@ def _depths(graph: Connections) -> dict[int, int]:
 
 
 def _text_width(text: str) -> float:
+    """Return the width [px] of a text with horizontal margins."""
     return LETTER * len(text) + 2 * _PAD
 
 
 def pill_width(edge: ConnectionEdge) -> float:
-    """Return the width of the label of a joint [px]."""
+    """Return the width [px] of the label of a joint, a rounded rectangle with name and kind.
+
+    Args:
+        edge: the joint.
+    """
     return _text_width(f"{edge.name}  {edge.kind}")
 
 
 def _box_size(node: ConnectionNode) -> tuple[float, float]:
+    """Return width and height [px] of the box of a link."""
     width = max(_text_width(line) for line in node.lines)
     # smallest width, for the word "base", and margins of 7 above and below the text [px]
     return max(width, 56.0), LINE * len(node.lines) + 14
 
 
 @dataclass(frozen=True, slots=True)
-class _DiagramSoFar:
-    """Layout under construction: positions of the parts that are placed."""
+class _Layout:
+    """Layout under construction: positions of the parts that are placed.
+
+    `hung` maps link numbers to the cut joints that are drawn below the link.
+    """
 
     graph: Connections
     hung: dict[int, tuple[ConnectionEdge, ...]]
@@ -256,18 +298,25 @@ class _DiagramSoFar:
     ancestors: dict[int, frozenset[int]]
 
     def width(self, number: int) -> float:
-        """Return the width of a link with all parts below it [px]."""
+        """Return the width [px] of link `number` with all parts below it."""
         below = [self.branch(edge) for edge in self.graph.children[number]]
         below += [pill_width(edge) for edge in self.hung[number]]
         needed = sum(below) + _GAP * max(0, len(below) - 1)
         return max(_box_size(self.graph.nodes[number])[0], needed)
 
     def branch(self, edge: ConnectionEdge) -> float:
-        """Return the width of a joint with all parts below it [px]."""
+        """Return the width [px] of a joint with all parts below it.
+
+        Args:
+            edge: joint.
+        """
         return max(pill_width(edge), self.width(edge.ends[1]))
 
     def place(self, number: int, left: float, y: float, above: frozenset[int]) -> None:
-        """Place a link and all parts below it, to the right of x = left."""
+        """Place link `number` at height y and all parts below it, to the right of x = left [px].
+
+        `above` are the numbers of its ancestors.
+        """
         wide = self.width(number)
         self.put(number, left + wide / 2, y, above)
         edges = self.graph.children[number]
@@ -285,17 +334,21 @@ class _DiagramSoFar:
             start += width + _GAP
 
     def put(self, number: int, x: float, y: float, above: frozenset[int]) -> None:
-        """Place a link."""
+        """Place the box of link `number` with its middle at (x, y) [px].
+
+        `above` are the numbers of its ancestors.
+        """
         node = self.graph.nodes[number]
         self.nodes[number] = PlacedNode(node, x, y, *_box_size(node))
         self.ancestors[number] = above
 
     def wrap(self, chain: list[int]) -> None:
-        """Place a chain in columns of similar length, each from top to bottom."""
+        """Place the links of an unbranched chain in columns of similar length, top to bottom."""
         columns = -(-len(chain) // _LONGEST)
         rows = -(-len(chain) // columns)
         edges = [self.graph.children[number][0] for number in chain[:-1]]
-        wide = max(self.branch_alone(edge) for edge in edges) + 3 * _GAP
+        boxes = (_box_size(self.graph.nodes[edge.ends[1]])[0] for edge in edges)
+        wide = max(*boxes, *map(pill_width, edges)) + 3 * _GAP
         for k, number in enumerate(chain):
             column, row = divmod(k, rows)
             x = (column + 0.5) * wide
@@ -303,10 +356,6 @@ class _DiagramSoFar:
             if k:
                 edge = edges[k - 1]
                 self.tree.append(PlacedEdge(edge, x, (row - 0.5) * LEVEL + 3, pill_width(edge)))
-
-    def branch_alone(self, edge: ConnectionEdge) -> float:
-        """Return the width of a joint with the link below it [px]."""
-        return max(pill_width(edge), _box_size(self.graph.nodes[edge.ends[1]])[0])
 
 
 _MARGIN, _TITLE, _FOOT = 26.0, 46.0, 40.0
@@ -332,6 +381,9 @@ class Diagram:
     def save(self, path: PathLike) -> None:
         """Write an .svg file.
 
+        Args:
+            path: path of the file.
+
         Raises:
             ExportError: the file extension is not .svg, or the file cannot be written.
         """
@@ -341,7 +393,13 @@ class Diagram:
 
 
 def diagram(system: SystemData) -> Diagram:
-    """Draw the connection graph of a system: spanning tree from the base downwards, cut joints."""
+    """Draw the connection graph of a system as an SVG picture.
+
+    The spanning tree runs from the base downwards; cut joints are dashed.
+
+    Args:
+        system: assembled system.
+    """
     graph = connections(system)
     placed = layout(graph)
     aside = sum(_rises(placed, pill) for pill in placed.cuts)
@@ -359,7 +417,7 @@ def diagram(system: SystemData) -> Diagram:
         f'<text class="title" x="{_MARGIN}" y="28">{escape(_title(system))}</text>',
         f'<g transform="translate({shift:.1f} {_TITLE + top:.1f})">',
         *_wires(placed),
-        *(_pill(edge) for edge in (*placed.tree, *placed.cuts)),
+        *(_joint_label(edge) for edge in (*placed.tree, *placed.cuts)),
         *(_box(node) for node in placed.nodes.values()),
         "</g>",
         *_notes(graph.remarks, height),
@@ -368,7 +426,15 @@ def diagram(system: SystemData) -> Diagram:
 
 
 def drawn(system: SystemData, path: PathLike | None) -> Diagram:
-    """Return `diagram(system)`, and write it to a file if path is not None."""
+    """Return the diagram of a system, and write it to a file.
+
+    Args:
+        system: assembled system.
+        path: path of the .svg file; None to write no file.
+
+    Raises:
+        ExportError: the file extension is not .svg, or the file cannot be written.
+    """
     made = diagram(system)
     if path is not None:
         made.save(path)
@@ -382,6 +448,7 @@ def _ascent(placed: Layout) -> float:
 
 
 def _title(system: SystemData) -> str:
+    """Return the title: name, number of bodies and loops, and mobility."""
     moving, loops = len(connections(system).nodes) - 1, len(system.cuts)
     count = f"{moving} moving bod{'y' if moving == 1 else 'ies'}"
     rest = f", {loops} loop{'s' if loops > 1 else ''}" if loops else ", no loop"
@@ -390,6 +457,7 @@ def _title(system: SystemData) -> str:
 
 
 def _document(width: float, height: float, body: list[str]) -> str:
+    """Return the text of an SVG file of this size [px], with the elements `body`."""
     size = f'width="{width:.0f}" height="{height:.0f}" viewBox="0 0 {width:.0f} {height:.0f}"'
     look = [
         *_style("light"),
@@ -403,6 +471,7 @@ def _document(width: float, height: float, body: list[str]) -> str:
 
 
 def _style(theme: Theme) -> Iterator[str]:
+    """Yield the CSS rules of a theme."""
     colours = PALETTE[theme]
     paint = {name: str(colours[name]) for name in ("background", "text", "base", "active", "loop")}
     soft = "#ffffff" if theme == "light" else "#232932"
@@ -427,6 +496,7 @@ def _style(theme: Theme) -> Iterator[str]:
 
 
 def _box(placed: PlacedNode) -> str:
+    """Return the SVG text of the box of the placed link."""
     base = placed.node.number == 0
     left, top = placed.x - placed.width / 2, placed.y - placed.height / 2
     rect = (
@@ -444,7 +514,8 @@ def _box(placed: PlacedNode) -> str:
     return rect + "".join(texts)
 
 
-def _pill(placed: PlacedEdge) -> str:
+def _joint_label(placed: PlacedEdge) -> str:
+    """Return the SVG text of the label of the placed joint, a rounded rectangle with its name."""
     edge = placed.edge
     look = f"{' active' if edge.driven else ''}{' loop' if edge.cut else ''}"
     left, top = placed.x - placed.width / 2, placed.y - PILL / 2
@@ -459,35 +530,37 @@ def _pill(placed: PlacedEdge) -> str:
 
 
 def _wires(placed: Layout) -> Iterator[str]:
+    """Yield the SVG paths from links to joints, and of the cut joints."""
     for pill in placed.tree:
         first, second = (placed.nodes[end] for end in pill.edge.ends)
-        yield _wire(_descent(first, pill))
+        yield _wire(_path_down(first, pill))
         yield _wire(f"M{pill.x:.1f} {pill.y:.1f}L{second.x:.1f} {second.y:.1f}")
     entered: Counter[int] = Counter()
     risen = 0
     for pill in placed.cuts:
         owner, other = (placed.nodes[end] for end in pill.edge.ends)
-        yield _wire(_descent(owner, pill), " open")
+        yield _wire(_path_down(owner, pill), " open")
         if _rises(placed, pill):
             risen += 1
-            yield _wire(_round(pill, other, placed.width + _ASIDE * risen), " open")
+            yield _wire(_path_beside(pill, other, placed.width + _ASIDE * risen), " open")
         else:
             entered[other.node.number] += 1
-            yield _wire(_across(pill, other, entered[other.node.number], placed), " open")
+            yield _wire(_path_to_bottom(pill, other, entered[other.node.number], placed), " open")
 
 
 def _wire(path: str, more: str = "") -> str:
+    """Return the SVG text of a line; `more` are further CSS classes."""
     return f'<path class="wire{more}" d="{path}"/>'
 
 
 def _rises(placed: Layout, pill: PlacedEdge) -> bool:
-    """Whether the other link of a cut joint is an ancestor of the link that it is drawn below."""
+    """Whether the second link of cut joint `pill` is an ancestor of the link it is drawn below."""
     owner, other = pill.edge.ends
     return other in placed.ancestors[owner]
 
 
-def _descent(node: PlacedNode, pill: PlacedEdge) -> str:
-    """Return the SVG path from a link to a joint below it or at the top of the next column."""
+def _path_down(node: PlacedNode, pill: PlacedEdge) -> str:
+    """Return the SVG path from a link `node` to a joint `pill` below it or in the next column."""
     foot = node.y + node.height / 2
     if pill.y > foot:
         bend = (foot + pill.y - PILL / 2) / 2
@@ -501,8 +574,8 @@ def _descent(node: PlacedNode, pill: PlacedEdge) -> str:
     )
 
 
-def _round(pill: PlacedEdge, other: PlacedNode, lane: float) -> str:
-    """Return the SVG path from a cut joint along the right side (x = lane) up to a link."""
+def _path_beside(pill: PlacedEdge, other: PlacedNode, lane: float) -> str:
+    """Return the SVG path from a cut joint along the right side (x = lane) up to link `other`."""
     foot, side = pill.y + PILL / 2, other.x + other.width / 2
     low = foot + 12
     return (
@@ -511,10 +584,11 @@ def _round(pill: PlacedEdge, other: PlacedNode, lane: float) -> str:
     )
 
 
-def _across(pill: PlacedEdge, other: PlacedNode, order: int, placed: Layout) -> str:
-    """Return the SVG path from a cut joint to the bottom of a link.
+def _path_to_bottom(pill: PlacedEdge, other: PlacedNode, order: int, placed: Layout) -> str:
+    """Return the SVG path from a cut joint to the bottom of link `other`.
 
-    It ends at the side of the link if joints are drawn below the link. order: number of the line.
+    It ends at the side of the link if joints are drawn below it. `order` is the number of such
+    lines to this link, from 1.
     """
     foot = pill.y + PILL / 2
     busy = any(edge.edge.ends[0] == other.node.number for edge in (*placed.tree, *placed.cuts))
@@ -537,7 +611,10 @@ def _across(pill: PlacedEdge, other: PlacedNode, order: int, placed: Layout) -> 
 
 
 def _notes(remarks: tuple[str, ...], height: float) -> Iterator[str]:
-    """Yield the texts of the couplings, and the key."""
+    """Yield SVG texts of the couplings (`remarks`) and of the legend, at the bottom of a picture.
+
+    `height` is that of the picture [px].
+    """
     y = height - 18
     for k, remark in enumerate(remarks):
         row = y - 26 - LINE * (len(remarks) - 1 - k)

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 
 from casadi import SX
 
-from mbs.assembly.parts import FlangeTurn, as_fast, number_or_sx
+from mbs.assembly.component_instances import FlangeTurn, as_fast, number_or_sx
 from mbs.components import (
     Component,
     Coupling,
@@ -41,7 +41,11 @@ from mbs.expressions import Expression, Number, Scalar, expression, to_float, to
 
 
 def check_flanges(mechanism: Description, parts: Sequence[Custom]) -> None:
-    """Raise if flanges are unconnected, or if shafts are connected to sliding parts.
+    """Raise if flanges are unconnected, or if rotating shafts are connected to sliding parts.
+
+    Args:
+        mechanism: components and connections of shafts.
+        parts: components with flanges.
 
     Raises:
         AssemblyError: the message has the flange and the remedy.
@@ -59,12 +63,12 @@ def check_flanges(mechanism: Description, parts: Sequence[Custom]) -> None:
                 " to nothing; connect it to another flange or leave the component out"
             )
     for flange in joined:
-        if _slides(flange):
+        if _is_translational(flange):
             _check_sliding(mechanism, flange, joined)
 
 
-def _slides(flange: Flange) -> bool | None:
-    """Return whether a flange translates; None if it may also rotate."""
+def _is_translational(flange: Flange) -> bool | None:
+    """Whether a flange translates; None if it may translate or rotate."""
     owner = flange.owner
     if isinstance(owner, Custom):
         return owner.slides(flange)
@@ -74,13 +78,16 @@ def _slides(flange: Flange) -> bool | None:
 def _check_sliding(
     mechanism: Description, start: Flange, joined: dict[Flange, list[Flange]]
 ) -> None:
-    """Raise AssemblyError if a rotating flange is connected to a sliding flange."""
+    """Raise AssemblyError if a rotating flange is connected to the sliding flange `start`.
+
+    `joined` maps each flange to the flanges that are connected to it.
+    """
     seen, queue = {start}, deque([start])
     while queue:
         for other in joined[queue.popleft()]:
             if other in seen:
                 continue
-            if _slides(other) is False:
+            if _is_translational(other) is False:
                 kind = "joint" if isinstance(start.owner, Joint) else type(start.owner).__name__
                 raise AssemblyError(
                     f"{mechanism.name}: {other} turns but {kind} {start.owner.name!r} slides; put"
@@ -96,7 +103,9 @@ def _fixed_flanges(
     parts: Iterable[Custom],
     ties: Mapping[Key, list[tuple[Key, Expression]]],
 ) -> dict[Key, FlangeTurn]:
-    """Return the rotations of the flanges that are connected to the housing, all zero.
+    """Return the rotations, all zero, of the flanges that are rigidly connected to the housing.
+
+    `ties` are as returned by `_rigid_connections`.
 
     Raises:
         AssemblyError: a joint is connected to the housing.
@@ -123,7 +132,14 @@ def _fixed_flanges(
 def ring_of_gears(
     mechanism: Description, key: tuple[str, str], first: Expression, second: Expression
 ) -> AssemblyError:
-    """Return the error for rigid gears with contradictory ratios."""
+    """Return the error for rigid gears that drive one flange with two different ratios.
+
+    Args:
+        mechanism: mechanism with the gears.
+        key: key of the flange.
+        first: angle of the flange per angle of the coordinate, on one path.
+        second: angle of the flange per angle of the coordinate, on another path.
+    """
     return AssemblyError(
         f"{mechanism.name}: rigid gears drive {key[0]!r} in two ways, with the ratios {first} and"
         f" {second}, so that nothing can turn; take one of them away or make it elastic"
@@ -131,9 +147,16 @@ def ring_of_gears(
 
 
 def inertia_missing(mechanism: Description, flanges: Sequence[Flange]) -> AssemblyError:
-    """Return the error for moving flanges without inertia."""
+    """Return the error for moving flanges whose acceleration no inertia determines.
+
+    Args:
+        mechanism: mechanism with the flanges.
+        flanges: one or more flanges.
+    """
     names = ", ".join(str(flange) for flange in flanges)
-    verb, part = ("slide", "SlidingMass") if _slides(flanges[0]) else ("turn", "ShaftInertia")
+    verb, part = (
+        ("slide", "SlidingMass") if _is_translational(flanges[0]) else ("turn", "ShaftInertia")
+    )
     return AssemblyError(
         f"{mechanism.name}: {names} {verb} without any inertia and without a joint, so that their"
         f" acceleration is not determined; connect a {part} to them"
@@ -141,7 +164,12 @@ def inertia_missing(mechanism: Description, flanges: Sequence[Flange]) -> Assemb
 
 
 def same_shaft(mechanism: Description, part: ShaftForce) -> AssemblyError:
-    """Return the error for an elastic part between rigidly connected flanges."""
+    """Return the error for an elastic part between rigidly connected flanges.
+
+    Args:
+        mechanism: mechanism with the part.
+        part: elastic part.
+    """
     return AssemblyError(
         f"{mechanism.name}: both flanges of {type(part).__name__} {part.name!r} are on one rigid"
         " shaft, which it cannot twist; connect one of them to another shaft"
@@ -177,7 +205,10 @@ class DriveLine:
 
 
 def drive_line(mechanism: Description) -> DriveLine:
-    """Return the mechanism with its drive lines replaced by joints, couplings and forces.
+    """Return a mechanism with its drive lines replaced by joints, couplings and forces.
+
+    Args:
+        mechanism: components and connections of shafts.
 
     Raises:
         AssemblyError: a flange is unconnected or connected to a flange of another kind, a shaft has
@@ -203,8 +234,13 @@ def drive_line(mechanism: Description) -> DriveLine:
 def _flange_rotations(
     mechanism: Description, parts: tuple[Custom, ...]
 ) -> tuple[dict[str, Flange], dict[Key, FlangeTurn]]:
-    """Return the reference flange of each rigid group, by coordinate name, and all rotations."""
-    ties = _ties(mechanism, parts)
+    """Return the reference flange of each rigid group of flanges, and the rotation of every flange.
+
+    The first dict has the names of the coordinates as keys, the second the keys of the flanges.
+
+    `parts` are the components of the drive line.
+    """
+    ties = _rigid_connections(mechanism, parts)
     values = _generic(mechanism)
     references: dict[str, Flange] = {}
     turns = _fixed_flanges(mechanism, parts, ties)
@@ -230,7 +266,7 @@ def _flange_rotations(
 
 
 def _generic(mechanism: Description) -> dict[str, float]:
-    """Return the values of parameters, with irregular numbers for parameters without value."""
+    """Return a value of every parameter: its default, or an irregular number."""
     return {
         p.name: 1 + number * _GOLDEN % 1 if p.default is None else p.default
         for number, p in enumerate(mechanism.parameters(), start=1)
@@ -238,7 +274,10 @@ def _generic(mechanism: Description) -> dict[str, float]:
 
 
 def _candidates(mechanism: Description, parts: tuple[Custom, ...]) -> Iterator[tuple[str, Flange]]:
-    """Yield the flanges whose angle may be the coordinate of a group, the best first."""
+    """Yield names and flanges of possible coordinates of rigid groups, the best first.
+
+    These are flanges of joints, then of parts with inertia, then of motors.
+    """
     used = {flange.owner.name for pair in mechanism.shafts for flange in pair}
     joints = [joint for joint in mechanism.joints() if joint.name in used]
     for joint in sorted(joints, key=lambda joint: joint.actuated is False):
@@ -251,10 +290,14 @@ def _candidates(mechanism: Description, parts: tuple[Custom, ...]) -> Iterator[t
             yield f"{part.name}.rotor", part.flanges[0]
 
 
-def _ties(
+def _rigid_connections(
     mechanism: Description, parts: tuple[Custom, ...]
 ) -> dict[Key, list[tuple[Key, Expression]]]:
-    """Return for each flange the rigidly connected flanges and their angle ratios."""
+    """Return for each flange the rigidly connected flanges and their angle ratios.
+
+    The dict has the keys of flanges; its values are lists of (key, ratio). `parts` are components
+    of the drive line.
+    """
     ties: dict[Key, list[tuple[Key, Expression]]] = {}
 
     def tie(a: Flange, b: Flange, ratio: Expression) -> None:
@@ -272,7 +315,12 @@ def _ties(
 
 
 def times(a: Scalar, b: Scalar) -> Expression:
-    """Return the product, without factors of one and zero."""
+    """Return the product of two factors; exact ones are left out and an exact zero gives zero.
+
+    Args:
+        a: number, parameter or expression.
+        b: number, parameter or expression.
+    """
     x, y = expression(a), expression(b)
     if _ZERO in (x, y):
         return _ZERO
@@ -280,10 +328,15 @@ def times(a: Scalar, b: Scalar) -> Expression:
 
 
 def _plus(a: Expression, b: Expression) -> Expression:
+    """Return a + b; the other term alone if one is exactly zero."""
     return b if a == _ZERO else a if b == _ZERO else a + b
 
 
 def _equal(a: Expression, b: Expression, values: Mapping[str, float]) -> bool:
+    """Whether two gear ratios a and b are equal at the parameter `values`, up to rounding.
+
+    Expressions without value are compared as such.
+    """
     x, y = to_float(a, values), to_float(b, values)
     if x is None or y is None:
         return a == b
@@ -297,14 +350,18 @@ def _group_joint(
     parts: Iterable[Custom],
     turns: Mapping[Key, FlangeTurn],
 ) -> Joint:
-    """Return the joint of a rigid group, with the inertias and motors of the group."""
+    """Return the joint of a rigid group of flanges, with the inertias and motors of the group.
+
+    `name` is the name of its coordinate, `reference` the flange with this angle, `parts` are the
+    components of the group and `turns` the rotations of all flanges.
+    """
     devices = [part for part in parts if part.drives]
     total: Expression = _ZERO
     for part in parts:
         factor = turns[part.flanges[0].key].factor
         total = _plus(total, times(times(factor, factor), part.own_inertia))
     if not isinstance(reference.owner, Joint):
-        kind = Prismatic if _slides(reference) else Revolute
+        kind = Prismatic if _is_translational(reference) else Revolute
         return kind(name, axis="z", actuated=bool(devices), Ia=total)
     joint = reference.owner
     if devices and joint.actuated is False:
@@ -319,7 +376,10 @@ def _group_joint(
 def _lower(
     mechanism: Description, changed: Mapping[str, Joint], turns: Mapping[Key, FlangeTurn]
 ) -> Description:
-    """Return the mechanism with joints of the groups, couplings to further joints, and forces."""
+    """Return the mechanism with the `changed` joints, couplings to further joints, and forces.
+
+    `turns` are the rotations of all flanges.
+    """
     result = _with_joints(mechanism, changed)
     joints = {joint.name: joint for joint in mechanism.joints()}
     for joint in joints.values():
@@ -330,7 +390,9 @@ def _lower(
             result.add(Coupling(name, joint.name, turn.coordinate, row))
     for force in mechanism.components.values():
         if isinstance(force, ShaftForce):
-            result.components[force.name] = replace(force, levers=_levers(mechanism, force, turns))
+            result.components[force.name] = replace(
+                force, levers=_moment_arms(mechanism, force, turns)
+            )
     for name, joint in changed.items():
         if name not in joints:
             result.components.pop(name, None)
@@ -359,9 +421,15 @@ def _with_joints(mechanism: Description, joints: Mapping[str, Joint]) -> Descrip
     return result
 
 
-def _levers(
+def _moment_arms(
     mechanism: Description, part: ShaftForce, turns: Mapping[Key, FlangeTurn]
 ) -> tuple[tuple[str, Expression], ...]:
+    """Return the moment arms of a force between shafts, as pairs of coordinate and factor.
+
+    Raises AssemblyError if both of its flanges are on one rigid shaft.
+
+    `part` is the force and `turns` the rotation of each flange, by its key.
+    """
     levers = []
     for flange, share in part.shares:
         turn = turns[flange.key]
@@ -398,7 +466,7 @@ class ShaftRow:
 
     @property
     def sentence(self) -> str:
-        """Description in a report: kind, name and rotation."""
+        """Description in a report: kind, name and rotation relative to the coordinate."""
         if self.own:
             return f"{self.kind} {self.name} has a coordinate of its own, {self.coordinate}."
         turns = f"turns {as_fast(self.factor, self.coordinate)}"
@@ -412,14 +480,19 @@ class ShaftRow:
 
 
 def shaft_rows(line: DriveLine, symbols: Mapping[str, SX]) -> tuple[ShaftRow, ...]:
-    """Return a row for every inertia, rigid gear, and motor whose rotor is a link."""
+    """Return a row for every inertia, rigid gear, and motor whose rotor has an own coordinate.
+
+    Args:
+        line: mechanism after its drive lines were replaced.
+        symbols: CasADi symbol of every parameter.
+    """
     rows = []
     for part in line.parts:
         turn = line.turns[part.flanges[0].key]
         own = line.links.get(turn.coordinate) == part.name
         if own or isinstance(part, (RigidPart, IdealGear)):
             factor = number_or_sx(to_sx(turn.factor, symbols))
-            slides = _slides(part.flanges[0]) is True
+            slides = _is_translational(part.flanges[0]) is True
             kind = type(part).__name__
             rows.append(ShaftRow(part.name, kind, turn.coordinate, own, factor, slides))
     return tuple(rows)

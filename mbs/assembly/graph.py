@@ -95,12 +95,12 @@ def connection_graph(
     _check_transmissions(mechanism)
     welds = _welds(mechanism, symbols)
     _require_connected(mechanism, welds)
-    at = _evaluator(symbols, values)
+    at = _Evaluator(symbols, values)
     nodes: list[BodyNode] = []
     home: dict[Port, int] = {}
     for port in _ports(mechanism):
         if port not in home:
-            members = _grow(port, welds, at)
+            members = _welded_to(port, welds, at)
             home.update(dict.fromkeys(members, len(nodes)))
             nodes.append(BodyNode(port[0], members))
     edges = tuple(
@@ -112,7 +112,7 @@ def connection_graph(
 
 
 def _check_transmissions(mechanism: Description) -> None:
-    """Raise if a gear, rack or screw couples coordinates of the wrong kinds."""
+    """Raise AssemblyError if a gear, rack or screw couples coordinates of the wrong kinds."""
     motions = {
         freedom.coordinate_of(joint.name): freedom.motion
         for joint in mechanism.joints()
@@ -132,7 +132,13 @@ def _check_transmissions(mechanism: Description) -> None:
 
 
 def inertia_of(node: BodyNode, mechanism: Description, symbols: Mapping[str, SX]) -> Inertia:
-    """Return the inertia of all bodies of a node about the origin of its frame."""
+    """Return the inertia of all bodies of a node about the origin of its frame, in its axes.
+
+    Args:
+        node: rigid body of the graph.
+        mechanism: components of the bodies.
+        symbols: CasADi symbol of every parameter.
+    """
     total = Inertia.zero()
     for (name, _), pose in node.members.items():
         component = mechanism.components[name]
@@ -142,11 +148,17 @@ def inertia_of(node: BodyNode, mechanism: Description, symbols: Mapping[str, SX]
 
 
 def is_weld(mechanism: Description, joint: Joint) -> bool:
-    """Return whether a joint welds its two bodies into one rigid body."""
+    """Whether a joint welds its two bodies into one rigid body: a Fixed joint that is not cut.
+
+    Args:
+        mechanism: mechanism with the joint.
+        joint: any joint.
+    """
     return isinstance(joint, Fixed) and joint.name not in mechanism.cuts
 
 
 def _ports(mechanism: Description) -> Iterator[Port]:
+    """Yield the ports of the world, of all bodies and of both sides of all joints."""
     yield mechanism.world.name, ""
     yield from ((body.name, "") for body in mechanism.bodies())
     for joint in mechanism.joints():
@@ -179,6 +191,10 @@ def _welds(
 def _require_connected(
     mechanism: Description, welds: Mapping[Port, list[tuple[Port, Pose]]]
 ) -> None:
+    """Raise AssemblyError if a body or a joint frame has no connection.
+
+    `welds` are the welded ports of each port.
+    """
     for (name, side), neighbours in welds.items():
         if not neighbours and name != mechanism.world.name:
             component: Component = mechanism.components[name]
@@ -189,12 +205,15 @@ def _require_connected(
             )
 
 
-def _grow(
+def _welded_to(
     start: Port,
     welds: Mapping[Port, list[tuple[Port, Pose]]],
     at: _Evaluator,
 ) -> dict[Port, Pose]:
-    """Return every port welded to `start`, with its pose relative to `start`."""
+    """Return every port that is welded to `start`, with its pose relative to `start`.
+
+    Raises AssemblyError if two paths of welds give different poses.
+    """
     members = {start: Pose.identity()}
     queue = deque([start])
     while queue:
@@ -210,23 +229,25 @@ def _grow(
 
 
 class _Evaluator:
-    """Callable that evaluates expressions at values of the parameters."""
+    """Callable from an expression to its numeric value at fixed values of the parameters."""
 
     def __init__(self, symbols: Mapping[str, SX], values: Mapping[str, float]) -> None:
+        """Prepare evaluation at `values` by name of the parameters in `symbols`."""
         self.p = casadi.vertcat(*symbols.values()) if symbols else SX(0, 1)
         self.values = [values[name] for name in symbols]
 
     def __call__(self, value: SX) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+        """Return the numeric value of an expression, as an array of its shape."""
         if not casadi.symvar(value):
             return np.array(casadi.DM(value))
         return np.array(casadi.Function("f", [self.p], [value])(self.values))
 
 
-def _evaluator(symbols: Mapping[str, SX], values: Mapping[str, float]) -> _Evaluator:
-    return _Evaluator(symbols, values)
-
-
 def _require_same_place(port: Port, first: Pose, second: Pose, at: _Evaluator) -> None:
+    """Raise AssemblyError if two paths of welds give different poses of a port.
+
+    `first` and `second` are the two poses, `at` evaluates expressions.
+    """
     difference = at(first.matrix - second.matrix)
     gap = float(np.linalg.norm(difference[:3, 3]))
     chord = float(np.linalg.norm(difference[:3, :3])) / (2 * np.sqrt(2))
@@ -245,6 +266,10 @@ def _edge(
     home: Mapping[Port, int],
     symbols: Mapping[str, SX],
 ) -> JointEdge:
+    """Return the edge of a joint between two nodes.
+
+    `home` maps ports to node indices. Raises AssemblyError if both sides are on one node.
+    """
     a, b = home[joint.name, "a"], home[joint.name, "b"]
     if a == b:
         raise AssemblyError(
@@ -262,7 +287,11 @@ def _edge(
 
 
 def _size(nodes: int, edges: Sequence[JointEdge], at: _Evaluator) -> float:
-    """Return the largest distance between two joints of one body; 1 if there is none [m]."""
+    """Return the largest distance between two joints of one body [m]; 1 if there is none.
+
+    `nodes` is the number of bodies, `edges` the joints between them, and `at` evaluates
+    expressions.
+    """
     points = at(casadi.horzcat(SX(3, 0), *(p for e in edges for p in (e.pose_a.p, e.pose_b.p))))
     on: list[list[Any]] = [[] for _ in range(nodes)]
     for number, edge in enumerate(edges):
@@ -279,7 +308,10 @@ def _size(nodes: int, edges: Sequence[JointEdge], at: _Evaluator) -> float:
 def _given_khalil(
     mechanism: Description, joint: Joint, node: BodyNode, symbols: Mapping[str, SX]
 ) -> Khalil | None:
-    """Return Khalil parameters of frame_a relative to its node; None if described otherwise."""
+    """Return Khalil parameters of frame_a relative to its node; None if described otherwise.
+
+    `node` is the rigid group of bodies that carries frame_a.
+    """
     for a, b in mechanism.connections:
         if b.owner is joint and b.port == "a" and not b.placement.steps:
             steps = a.placement.steps
@@ -364,7 +396,7 @@ def spanning_tree(
 
 
 def _describe_unreached(name: str, graph: BodyGraph, number: int) -> str:
-    """Return the error message for a node without a path to the world."""
+    """Return the error text for a node `number` without a path to the world, in system `name`."""
     holders = [e.joint for e in graph.edges if number in (e.a, e.b) and not e.joint.places]
     where = f"{name}: no chain of joints leads from the world to {graph.nodes[number].name!r}"
     if holders:
@@ -377,6 +409,10 @@ def _describe_unreached(name: str, graph: BodyGraph, number: int) -> str:
 
 
 def _prim(graph: BodyGraph, need: set[str], keep: set[str], cut: set[str]) -> list[JointEdge]:
+    """Return the joints of a spanning tree by Prim's algorithm; see `spanning_tree`.
+
+    `need`, `keep` and `cut` are names of joints.
+    """
     depth = {0: 0}
     chosen: list[JointEdge] = []
     queue: list[tuple[tuple[bool, int, int, int, int], int]] = []
@@ -405,6 +441,10 @@ def _prim(graph: BodyGraph, need: set[str], keep: set[str], cut: set[str]) -> li
 
 
 def _depth_first(graph: BodyGraph, chosen: list[JointEdge]) -> list[Branch]:
+    """Return the joints of a tree as branches in depth-first order from the world.
+
+    `chosen` are the joints of the tree.
+    """
     branches: list[Branch] = []
     rank = {id(edge): number for number, edge in enumerate(graph.edges)}
     ordered = sorted(chosen, key=lambda edge: rank[id(edge)])
@@ -422,6 +462,7 @@ def _depth_first(graph: BodyGraph, chosen: list[JointEdge]) -> list[Branch]:
 
 
 def _branches_from(node: int, edges: list[JointEdge]) -> list[Branch]:
+    """Return the joints at a node as branches that start at it."""
     return [
         Branch(edge, node, edge.b if edge.a == node else edge.a, edge.a == node)
         for edge in edges

@@ -122,7 +122,7 @@ class _Chosen:
 def khalil_frames(
     mechanism: Description, graph: BodyGraph, spanning: SpanningTree, symbols: Mapping[str, SX]
 ) -> KhalilTree:
-    """Number the links, place their frames and sum their inertias.
+    """Return the tree of links with numbered links, Khalil frames and inertias.
 
     Args:
         mechanism: components and connections.
@@ -176,7 +176,10 @@ def khalil_frames(
 
 
 def _keep(spanning: SpanningTree) -> list[Branch]:
-    """Return branches of cut joints that stay in the tree: with an effort or without rows."""
+    """Return the branches of cut joints that stay in the tree with a free end.
+
+    These are joints with an effort, and joints without closure rows.
+    """
     return [
         Branch(edge, edge.a, -1, True)
         for edge in spanning.cuts
@@ -190,7 +193,11 @@ def _extend(
     parent: int,
     branch: Branch,
 ) -> tuple[int, Pose]:
-    """Add the links of one joint; return the last link and the pose of the child node on it."""
+    """Append the links of the joint of a branch to `drafts`.
+
+    `base` contains the poses of nodes on the base; `parent` is the index of the link before the
+    joint. Return the last link and the pose of the child node on it.
+    """
     edge = branch.edge
     near, far = (edge.pose_a, edge.pose_b) if branch.forward else (edge.pose_b, edge.pose_a)
     nodes = base if parent < 0 else drafts[parent].nodes
@@ -251,7 +258,10 @@ def _chosen_frames(drafts: Sequence[_DescribedLink], size: float) -> list[_Chose
 
 
 def _align(freedom: Freedom, forward: bool) -> Pose:
-    """Return the frame with z along the axis of a freedom, reversed for a backward joint."""
+    """Return the rotation of a frame with z along the axis of a freedom.
+
+    The axis is reversed for a joint that the tree passes from frame_b to frame_a.
+    """
     if freedom.motion not in _ALONG_Z:
         return Pose.identity()
     pose = Pose.rotation(align_z(freedom.axis))
@@ -261,7 +271,10 @@ def _align(freedom: Freedom, forward: bool) -> Pose:
 def _rotor(
     edge: JointEdge, place: Callable[[int], tuple[int, Pose]], symbols: Mapping[str, SX]
 ) -> CarriedRotor | None:
-    """Return the rotor of a joint, on the link that carries the joint's frame_a."""
+    """Return the rotor of a joint, on the link of the joint's frame_a; None without rotor.
+
+    `place` maps a node index to link and pose.
+    """
     rotor = edge.joint.rotor
     if rotor is None:
         return None
@@ -282,6 +295,7 @@ def _links(
     rotors: list[CarriedRotor | None],
     symbols: Mapping[str, SX],
 ) -> tuple[Link, ...]:
+    """Return the links of a tree from their descriptions, chosen frames, inertias and rotors."""
     links, nq, nv = [], 0, 0
     for draft, frame, inertia, rotor in zip(drafts, chosen, inertias, rotors, strict=True):
         motion = draft.motion

@@ -66,6 +66,10 @@ def function_table(function: ModelFunction) -> str:
 
 
 def _rows_of_elements(function: ModelFunction, name: str, size: int) -> list[str]:
+    """Return a line of text for each element of the input or output `name`.
+
+    Empty if the number of named elements differs from `size`.
+    """
     rows = function.elements(name)
     if len(rows) != size:
         return []
@@ -207,13 +211,17 @@ class ModelFunction(Function):
         return self
 
     def like(self, function: Function) -> ModelFunction:
-        """Return a model with another Function of the same inputs, with the same checks."""
+        """Return a model with another Function of the same inputs, with the same checks.
+
+        Args:
+            function: Function with the inputs of this model, such as a derivative or compiled code.
+        """
         made = ModelFunction(function, self._system, check=self._check_configuration)
         made.may_be_nan = self.may_be_nan
         return made
 
     def asked(self) -> tuple[str, ...]:
-        """Return the names of the inputs with validity conditions: positions q, parameters p."""
+        """Return the names of the inputs that have validity conditions: "q", "p", both or none."""
         sizes = {"q": self._system.nq, "p": len(self._system.parameters)}
         return tuple(
             name
@@ -251,7 +259,7 @@ class ModelFunction(Function):
         return Function("valid", given, [every], one.name_in(), ["valid"])
 
     def _valid_of_one(self) -> Function | None:
-        """Return `valid` for one column."""
+        """Return the Function `valid` for one column; None if there are no conditions."""
         if self._of_one is None:
             q = SX.sym("q", self._system.nq)
             if not (rows := self.rows(q)):
@@ -284,22 +292,30 @@ class ModelFunction(Function):
             return None
 
     def rewritten(self, function: Function) -> ModelFunction:
-        """Return a copy with an equivalent Function `function`; named intermediates are kept."""
+        """Return a copy with an equivalent Function; the named intermediate quantities are kept.
+
+        Args:
+            function: Function with the same inputs, outputs and values.
+        """
         made = self.like(function)
         if self._annotate is not None:
             made._annotate = lambda: names_found(Function(function), self.annotated())
         return made
 
     def map(self, *args: Any) -> Function:
-        """Return the Function over many columns, as `casadi.Function.map`."""
+        """Return the model over many columns; arguments as `casadi.Function.map`."""
         return self.like(Function.map(self, *args))
 
     def expand(self, *args: Any) -> Function:
-        """Return the Function on scalars only, as `casadi.Function.expand`."""
+        """Return the model as scalar (SX) operations; arguments as `casadi.Function.expand`."""
         return self.like(Function.expand(self, *args))
 
     def elements(self, name: str) -> list[tuple[str, str]]:
-        """Return name and unit of every element of an input or output; empty without names."""
+        """Return (name, unit) of every element of an input or output; empty if they have no names.
+
+        Args:
+            name: name of the input or output.
+        """
         return _elements(self._system).get(name, [])
 
     def describe(self) -> str:
@@ -311,15 +327,25 @@ class ModelFunction(Function):
         return self.describe()
 
     def example(self, name: str) -> NDArray[np.float64] | None:
-        """Return a valid value of an input with conditions; None if any number is valid."""
+        """Return a valid value of an input with conditions; None if any number is valid.
+
+        Args:
+            name: name of the input.
+        """
         return self.default_of_p() if name == "p" else None
 
     @property
     def _title(self) -> str:
+        """Name of the Function and of its system, for error messages."""
         return f"{self.name()}({self._system.name})"
 
     def _given(self, args: tuple[Any, ...], kwargs: dict[str, Any]) -> dict[str, Any]:
-        """Return every input by name, with the default of p."""
+        """Return every input by name, with the default of p.
+
+        Raises ModelError for a missing, unknown or repeated input.
+
+        `args` and `kwargs` are the arguments of a call.
+        """
         names = self._sizes
         given = dict(zip(names, args, strict=False))
         twice = [name for name in kwargs if name in given]
@@ -343,7 +369,10 @@ class ModelFunction(Function):
         return {name: given[name] for name in names}
 
     def _input(self, name: str, value: Any) -> Any:
-        """Return an input for CasADi: finite numbers of the right size, or symbols."""
+        """Return an input as CasADi accepts it: finite numbers of the right size, or symbols.
+
+        Raises ModelError for any other value.
+        """
         if isinstance(value, (list, tuple)) and any(isinstance(e, (SX, MX, DM)) for e in value):
             value = casadi.vertcat(*value)
         if isinstance(value, (SX, MX, DM)):
@@ -364,6 +393,7 @@ class ModelFunction(Function):
         return value
 
     def _check_size(self, name: str, shape: tuple[int, ...], value: Any) -> None:
+        """Raise ModelError if the shape of an input does not fit; `value` is the input itself."""
         expected, width = self._sizes[name]
         rows, columns = (*shape, 1, 1)[:2]
         if width > 1 and not self.elements(name):
@@ -389,7 +419,11 @@ class ModelFunction(Function):
         raise ModelError(f"{self._title}: {name} has {has}, it needs {expected}{known}")
 
     def _require_valid(self, inputs: dict[str, Any]) -> bool:
-        """Raise ModelError for invalid numbers; return whether outputs are to be verified."""
+        """Raise ModelError for invalid numbers; return whether outputs are to be verified.
+
+        `inputs` are the values by name. Outputs are verified if the configuration is nearly
+        singular.
+        """
         one = self._state_of_one() if self._asks else None
         if one is None:
             return False
@@ -421,7 +455,7 @@ class ModelFunction(Function):
         return is_delicate
 
     def _refuse(self, column: dict[str, NDArray[np.float64]]) -> None:
-        """Raise ModelError with the violated condition of a column of inputs."""
+        """Raise ModelError with the violated condition of one column of inputs, given by name."""
         given = {name: _dm(values) for name, values in column.items()}
         if self._check_configuration is not None and "q" in given:
             self._check_configuration.refuse(self._system, given["q"], given.get("p", DM()))
@@ -433,7 +467,7 @@ class ModelFunction(Function):
         raise ModelError(f"{self._title}: {broken.sentence}")
 
     def _verify(self, inputs: dict[str, Any], outputs: Any) -> None:
-        """Raise an error if outputs of numeric inputs are inaccurate."""
+        """Raise an error if the configuration check finds numeric outputs inaccurate."""
         check = self._check_configuration
         every = outputs if isinstance(outputs, tuple) else (outputs,)
         if check is None or check.verify is None or not all(isinstance(o, DM) for o in every):
@@ -445,6 +479,7 @@ class ModelFunction(Function):
         check.verify(self._system, self.name_out(), evaluate, inputs, every)
 
     def _require_numbers(self, outputs: Any) -> None:
+        """Raise ModelError if a numeric output is NaN, except the outputs in `may_be_nan`."""
         every = outputs if isinstance(outputs, tuple) else (outputs,)
         names = self.name_out() if self.may_be_nan else itertools.repeat("")
         if all(
@@ -459,12 +494,13 @@ class ModelFunction(Function):
         )
 
     def _shapes(self) -> str:
+        """Return names and sizes of the inputs as text for error messages."""
         sizes = (f"{name} {self.size_in(name)}" for name in self.name_in())
         return ", ".join(sizes)
 
 
 def _dm(array: NDArray[np.float64]) -> DM:
-    """Return an array as DM; with a sparsity pattern CasADi converts it in half the time."""
+    """Return an array as DM. With a sparsity pattern, CasADi converts it in half the time."""
     rows, columns = (*array.shape, 1, 1)[:2]
     return DM(Sparsity.dense(rows, columns), array.ravel(order="F"))
 
@@ -484,6 +520,7 @@ def _columns(value: DM | SX | MX | None, rows: int) -> NDArray[np.float64] | Non
 def _unpickle(
     data: str, system: System, check: ConfigurationCheck | None, loops: Any
 ) -> ModelFunction:
+    """Return the model of a pickle made by `ModelFunction.__reduce__`."""
     return ModelFunction(Function.deserialize(data), system, check=check, loops=loops)
 
 
@@ -547,7 +584,14 @@ def signals_in(system: System, inputs: Named, outputs: Named) -> Named:
 
 
 def default_in(system: System, others: int) -> list[float]:
-    """Return the defaults for CasADi: 0, and for p the value common to all parameters or NaN."""
+    """Return the default inputs for CasADi, which have one number per input.
+
+    It is 0, and for p the value that all parameters have in common, or NaN.
+
+    Args:
+        system: system of the model.
+        others: number of inputs before p.
+    """
     if not system.parameters:
         return [0.0] * others
     values = set(system.p_default)
@@ -556,6 +600,9 @@ def default_in(system: System, others: int) -> list[float]:
 
 def require_system(system: object) -> None:
     """Raise if the argument is not a System, such as a mechanism that was not assembled.
+
+    Args:
+        system: any object.
 
     Raises:
         ModelError: the argument is no System. The message has the required call.
@@ -569,6 +616,7 @@ def require_system(system: object) -> None:
 
 
 def _elements(system: System) -> dict[str, list[tuple[str, str]]]:
+    """Return lists of (name, unit) of elements, by the name of each input or output of models."""
     q = [(coordinate.name, coordinate.unit) for coordinate in system.coordinates]
     free = [system.speeds[k] for k in system.free]
     units = {"v": _SAME_UNIT, "a": ACCELERATION_UNIT, "tau": EFFORT_UNIT}

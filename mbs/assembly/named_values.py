@@ -22,7 +22,15 @@ from mbs.text import did_you_mean, quoted, without_values
 
 
 def frame_of(system: SystemData, name: str | int) -> tuple[int, Pose]:
-    """Return the link (-1 for the base) and the pose of a frame; see `System.frame`."""
+    """Return the link (-1 for the base) and the pose of a frame on this link.
+
+    Args:
+        system: assembled system.
+        name: name of the frame, or number of a link or table frame; see `System.frame`.
+
+    Raises:
+        ModelError: there is no such frame.
+    """
     if isinstance(name, (int, np.integer)) and not isinstance(name, bool):
         if system.numbered:
             return _numbered_frame(system, int(name))
@@ -44,6 +52,10 @@ def frame_of(system: SystemData, name: str | int) -> tuple[int, Pose]:
 
 
 def _numbered_frame(system: SystemData, number: int) -> tuple[int, Pose]:
+    """Return link and pose of the frame with this number in the table of frames; 0 is the base.
+
+    Raises ModelError if no body has it.
+    """
     if number == 0:
         return system.frames["base"]
     if number not in system.numbered:
@@ -58,13 +70,29 @@ def _numbered_frame(system: SystemData, number: int) -> tuple[int, Pose]:
 def position_of(
     system: SystemData, values: Mapping[str, float] | Sequence[float] | None
 ) -> list[float]:
-    """Return positions q from values by name; see `System.position`."""
+    """Return positions q (nq,) from values by name or in order; see `System.position`.
+
+    Args:
+        system: assembled system.
+        values: positions [rad or m]; others are those of the assembled configuration.
+
+    Raises:
+        ModelError: a name is unknown, or a value is not a finite number.
+    """
     start, given = list(system.configuration), plain_names(system, values, GUESSES)
     return _filled(system, given, system.coordinates, start, "position")
 
 
 def positions_at_cuts(system: SystemData, values: Mapping[str, float]) -> dict[str, float]:
-    """Return the values that belong to cut joints; see `System.positions_at_cuts`."""
+    """Return the values that belong to coordinates of cut joints, by the same names.
+
+    Args:
+        system: assembled system.
+        values: positions by coordinate name [rad or m]. Other joints are left out.
+
+    Raises:
+        ModelError: a position of a cut joint is not a finite number.
+    """
     names = [coordinate.name for coordinate in system.cut_coordinates]
     found = {name: value for name, value in values.items() if name in names}
     return {name: _number(system, value, f"position of {name}") for name, value in found.items()}
@@ -73,7 +101,15 @@ def positions_at_cuts(system: SystemData, values: Mapping[str, float]) -> dict[s
 def velocity_of(
     system: SystemData, values: Mapping[str, float] | Sequence[float] | None
 ) -> list[float]:
-    """Return velocities v from values by name; see `System.velocity`."""
+    """Return velocities v (nv,) from values by name or in order; see `System.velocity`.
+
+    Args:
+        system: assembled system.
+        values: velocities [rad/s or m/s]; others are zero.
+
+    Raises:
+        ModelError: a name is unknown, or a value is not a finite number.
+    """
     given = plain_names(system, values, VELOCITIES)
     return _filled(system, given, system.speeds, [0.0] * system.nv, "velocity")
 
@@ -81,13 +117,30 @@ def velocity_of(
 def effort_of(
     system: SystemData, values: Mapping[str, float] | Sequence[float] | None
 ) -> list[float]:
-    """Return joint efforts tau from values by name; see `System.effort`."""
+    """Return joint efforts tau (nv,) from values by name or in order; see `System.effort`.
+
+    Args:
+        system: assembled system.
+        values: efforts [N m or N]; others are zero.
+
+    Raises:
+        ModelError: a name is unknown, or a value is not a finite number.
+    """
     given = plain_names(system, values, EFFORTS)
     return _filled(system, given, system.speeds, [0.0] * system.nv, "effort")
 
 
 def plain_names(system: SystemData, values: Any, kinds: Collection[str]) -> Any:
-    """Return values by coordinate name; see `System.plain_names`."""
+    """Return values by coordinate name, such as j1, from names of variables, such as j1.q.
+
+    Args:
+        system: assembled system.
+        values: values by name. An argument of another type is returned unchanged.
+        kinds: accepted ends of names of variables, such as ("q",).
+
+    Raises:
+        ModelError: a value is given by both names, or the name is of another quantity.
+    """
     if not isinstance(values, Mapping):
         return values
     rows = (*system.coordinates, *system.cut_coordinates, *system.speeds)
@@ -101,6 +154,11 @@ def _filled(
     start: list[float],
     what: str,
 ) -> list[float]:
+    """Return the list `start` with the given values inserted, by name or all in order.
+
+    `what` is the quantity in error messages. Raises ModelError for an unknown name or a wrong
+    number of values.
+    """
     names = [coordinate.name for coordinate in coordinates]
     if values is None:
         return start
@@ -128,6 +186,10 @@ def _filled(
 
 
 def _numbers(system: SystemData, values: Any, what: str) -> list[float]:
+    """Return `values` as a list of finite floats.
+
+    Raises ModelError for any other value; `what` names the values in its message.
+    """
     if isinstance(values, (list, tuple)):  # numpy makes no array of several (1, 1) of CasADi
         values = [float(x) if isinstance(x, DM) and x.numel() == 1 else x for x in values]
     array = numbers_given(values)
@@ -147,6 +209,10 @@ def _numbers(system: SystemData, values: Any, what: str) -> list[float]:
 
 
 def _number(system: SystemData, value: Any, what: str) -> float:
+    """Return `value` as a float.
+
+    Raises ModelError unless it is a single finite number; `what` names it in the message.
+    """
     numbers = _numbers(system, value, what)
     if len(numbers) != 1:
         raise ModelError(f"{system.name}: the {what} has {len(numbers)} values; give one number")
@@ -158,7 +224,16 @@ def parameter_values(
     values: Mapping[str, float] | None = None,
     needed: Container[str] | None = None,
 ) -> list[float]:
-    """Return parameters p from values by name; see `System.parameter_values`."""
+    """Return parameters p (np,) from values by name; see `System.parameter_values`.
+
+    Args:
+        system: assembled system.
+        values: values by name; others are default values.
+        needed: names of the parameters that must have a value; None for all.
+
+    Raises:
+        ModelError: a name is unknown, a parameter has no value, or a value is invalid.
+    """
     names = [parameter.name for parameter in system.parameters]
     if values is not None and not isinstance(values, Mapping):
         raise ModelError(
@@ -191,7 +266,12 @@ def parameter_values(
 
 
 def parameter_fault(system: SystemData, p: Iterable[float]) -> str:
-    """Return the error message on values of p; see `System.parameter_fault`."""
+    """Return the error message on values of the parameters; empty if they are valid.
+
+    Args:
+        system: assembled system.
+        p: (np,) values. NaN means that no value is given.
+    """
     values = {
         parameter.name: float(value)
         for parameter, value in zip(system.parameters, p, strict=True)

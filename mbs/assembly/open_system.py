@@ -7,18 +7,18 @@ from collections.abc import Collection, Mapping, Sequence
 import casadi
 from casadi import SX
 
-from mbs.assembly.drive_line import drive_line, shaft_rows
-from mbs.assembly.graph import BodyGraph, connection_graph, spanning_tree
-from mbs.assembly.khalil_frames import Cut, KhalilTree, khalil_frames
-from mbs.assembly.parameter_bounds import bounded_fields, inertia_notes, parameter_bounds
-from mbs.assembly.parts import (
+from mbs.assembly.component_instances import (
     ComponentInstance,
     attached_parts,
     coordinates_needed,
     symbols_in_order,
     with_unknowns,
 )
-from mbs.assembly.proof import prove
+from mbs.assembly.drive_line import drive_line, shaft_rows
+from mbs.assembly.graph import BodyGraph, connection_graph, spanning_tree
+from mbs.assembly.khalil_frames import Cut, KhalilTree, khalil_frames
+from mbs.assembly.parameter_bounds import bounded_fields, inertia_notes, parameter_bounds
+from mbs.assembly.pose_check import check_poses
 from mbs.assembly.system import System
 from mbs.assembly.tables import (
     BodyRow,
@@ -74,11 +74,12 @@ def open_system(mechanism: Description, guessed: Collection[str] = ()) -> System
     )
     framed = khalil_frames(mechanism, graph, spanning, symbols)
     places = _places(graph, framed)
-    prove(mechanism, framed, places, symbols, _trial_values(parameters))
+    check_poses(mechanism, framed, places, symbols, _trial_values(parameters))
     on_links = [(body, places[body.name, ""][0]) for body in faulty]
     notes += [note for note in inertia_notes(framed.tree, on_links) if note not in notes]
     joints = {joint.name: joint for joint in mechanism.joints()}
-    in_loops = _looped_joints(framed) | _driven_joints(mechanism)
+    looped = {name for cut in framed.cuts for name in _loop_joints(framed, cut)}
+    in_loops = looped | _driven_joints(mechanism)
     moving_links = [
         (link.motion, link.name, joints[name])
         for link, name in zip(framed.tree.links, framed.joints, strict=True)
@@ -135,6 +136,7 @@ def _trial_values(parameters: Sequence[Parameter]) -> dict[str, float]:
 
 
 def _check_names(mechanism: Description, coordinates: Sequence[Coordinate]) -> None:
+    """Raise AssemblyError if two coordinates have the same name."""
     names = [coordinate.name for coordinate in coordinates]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
@@ -144,7 +146,7 @@ def _check_names(mechanism: Description, coordinates: Sequence[Coordinate]) -> N
 
 
 def _owners(mechanism: Description, coordinates: Collection[str]) -> set[str]:
-    """Return the names of the joints of these coordinates."""
+    """Return the names of the joints to which coordinates with these names belong."""
     return {
         joint.name
         for joint in mechanism.joints()
@@ -154,6 +156,7 @@ def _owners(mechanism: Description, coordinates: Collection[str]) -> set[str]:
 
 
 def _is_actuated(joint: Joint, in_loops: set[str]) -> bool:
+    """Whether a joint has a motor; by default not in loops (`in_loops`) and not if it is free."""
     if joint.actuated is None:
         return joint.name not in in_loops and not isinstance(joint, Free)
     return joint.actuated
@@ -166,12 +169,8 @@ def _loop_joints(framed: KhalilTree, cut: Cut) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def _looped_joints(framed: KhalilTree) -> set[str]:
-    return {name for cut in framed.cuts for name in _loop_joints(framed, cut)}
-
-
 def _driven_joints(mechanism: Description) -> set[str]:
-    """Return the names of the driven joints of couplings."""
+    """Return the names of the joints whose coordinate is the driven one of a coupling."""
     driven = [coupling.driven for coupling in mechanism.couplings()]
     return _owners(mechanism, driven)
 
@@ -179,6 +178,10 @@ def _driven_joints(mechanism: Description) -> set[str]:
 def _loop_rows(
     mechanism: Description, framed: KhalilTree, parts: Sequence[ComponentInstance]
 ) -> tuple[LoopRow, ...]:
+    """Return the table of loops: cut joints, couplings, and components that constrain velocities.
+
+    `framed` is the tree with its cut joints, and `parts` are the equation-based components.
+    """
     loops = [
         LoopRow(
             name=cut.edge.joint.name,
@@ -198,13 +201,17 @@ def _loop_rows(
 
 
 def _bound_joints(framed: KhalilTree, part: ComponentInstance) -> tuple[str, ...]:
-    """Return the names of the joints that move the ports of a component."""
+    """Return the names of the joints that move the ports of a component.
+
+    `framed` is the tree with its frames.
+    """
     links = [k for link, _ in part.frames for k in framed.tree.path(link)]
     names = [framed.joints[k] for k in sorted(set(links))]
     return tuple(dict.fromkeys([*names, *(lever.name for lever in part.levers)]))
 
 
 def _cut_coordinates(cuts: Sequence[Cut]) -> tuple[Coordinate, ...]:
+    """Return the coordinates of the cut joints that are not elements of q."""
     rows: list[Coordinate] = []
     for cut in cuts:
         joint = cut.edge.joint
@@ -236,6 +243,7 @@ def _bodies(mechanism: Description, graph: BodyGraph, framed: KhalilTree) -> tup
 
 
 def _mass(body: Component, values: Mapping[str, float]) -> float | None:
+    """Return the mass [kg] of a body at parameter values; None without a value, 0 without mass."""
     for attribute in ("solid_mass", "mass", "M"):
         scalar = getattr(body, attribute, None)
         if scalar is not None:
@@ -244,6 +252,7 @@ def _mass(body: Component, values: Mapping[str, float]) -> float | None:
 
 
 def _places(graph: BodyGraph, framed: KhalilTree) -> Places:
+    """Return link and pose of every body and joint frame, by component and port."""
     return {
         port: (link, pose @ inside)
         for node, (link, pose) in zip(graph.nodes, framed.homes, strict=True)
@@ -280,6 +289,7 @@ def _frames(
 def _shapes(
     mechanism: Description, places: Places, symbols: Mapping[str, SX]
 ) -> tuple[ShapeRow, ...]:
+    """Return the shapes with the links that carry them, for pictures."""
     rows = []
     for point, shape in mechanism.shapes:
         link, pose = places[point.owner.name, point.port]
@@ -290,7 +300,10 @@ def _shapes(
 def _number(
     mechanism: Description, frames: Mapping[str, tuple[int, Pose]], links: int
 ) -> dict[int, str]:
-    """Return the bodies of the numbered frames of a table; empty if the numbers are the links'."""
+    """Return the body of each frame number of the table from which the mechanism was made.
+
+    Empty if the numbers are those of the `links`.
+    """
     same = len(mechanism.numbered) == links and all(
         frames[name][0] == number - 1 and frames[name][1].is_identity()
         for number, name in mechanism.numbered.items()
@@ -301,6 +314,12 @@ def _number(
 def _couplings(
     mechanism: Description, coordinates: Sequence[Coordinate], symbols: Mapping[str, SX]
 ) -> tuple[CoordinateCoupling, ...]:
+    """Return the relations between coordinates by their indices in q.
+
+    Raises AssemblyError if a coordinate is not in the tree.
+
+    `coordinates` are the elements of q.
+    """
     numbers = {coordinate.name: number for number, coordinate in enumerate(coordinates)}
     result = []
     for coupling in mechanism.couplings():

@@ -103,29 +103,35 @@ def bounded_fields(
 
 
 def _with_value(component: Component, name: str, value: float) -> None:
+    """Check a component with `value` for the parameter `name`; raise if it rejects the value."""
     component.check_values({name: value})
 
 
 def _with_field(component: Component, name: str, value: float) -> None:
+    """Check a component with `value` for its field `name`; raise if it rejects the value."""
     changed: dict[str, Any] = {name: Number(value)}
     replace(component, **changed)
 
 
 def _declared(component: Component) -> Iterator[tuple[str, Bounds]]:
-    """Yield the declared bounds of an equation-based component, by field."""
+    """Yield field name and bounds of the declared parameters of an equation-based component."""
     if isinstance(component, Custom):
         for name in component.names_of("parameter"):
             yield name, (component.declared[name].low, component.declared[name].high)
 
 
 def _tighter(a: Bounds, b: Bounds) -> Bounds:
+    """Return the intersection of two pairs of bounds (lower, upper); None means no bound."""
     lows = [bound for bound in (a[0], b[0]) if bound is not None]
     highs = [bound for bound in (a[1], b[1]) if bound is not None]
     return max(lows, default=None), min(highs, default=None)
 
 
 def _bounds(check: Callable[[float], object]) -> Bounds:
-    """Return the bounds 0 and 1 of a rule, from the trial values that it rejects."""
+    """Return the lower bound 0 and upper bound 1 of a rule, as far as it has them.
+
+    `check` raises for values that the rule rejects; it is called with trial values.
+    """
     low: float | None = None
     taken = not all(_is_refused(check, value) for value in _ABOVE_ZERO)
     if taken and all(_is_refused(check, value) for value in _BELOW_ZERO):
@@ -136,6 +142,7 @@ def _bounds(check: Callable[[float], object]) -> Bounds:
 
 
 def _is_refused(check: Callable[[float], object], value: float) -> bool:
+    """Whether `check` raises for a value."""
     try:
         check(value)
     except (DescriptionError, ArithmeticError):
@@ -151,9 +158,10 @@ _PARALLEL = 1e-9
 
 
 def inertia_notes(tree: Tree, bodies: Iterable[tuple[RigidBody, int]]) -> list[ImportNote]:
-    """Return notes on impossible inertias of bodies.
+    """Return notes on bodies whose inertia no mass distribution has, such as Ixx > Iyy + Izz.
 
-    The motion of a body with a single rotation axis depends only on the moment of inertia about it.
+    The motion of a body with a single rotation axis depends only on the moment of inertia about it,
+    so that such an inertia is only noted.
 
     Args:
         tree: tree of the mechanism.

@@ -45,6 +45,9 @@ def content_of(state: Any) -> Packed | None:
 
     The result is None if the object contains a class or a function of a user: a pickle contains
     only its name, and its code may change. The result is also None if there is no pickle.
+
+    Args:
+        state: object that may contain any number of SX.
     """
     try:
         found, names_alone = _pack(state)
@@ -54,7 +57,7 @@ def content_of(state: Any) -> Packed | None:
 
 
 def _pack(state: Any) -> tuple[Packed, bool]:
-    """Return the pickle of an object and whether it names code of a user."""
+    """Return the pickle of an object, and whether it refers to code of a user by name."""
     buffer = io.BytesIO()
     pickler = _Pickler(buffer)
     pickler.dump(state)
@@ -71,18 +74,23 @@ _KNOWN = frozenset({"mbs", "casadi", "numpy", *sys.stdlib_module_names})
 
 
 class _Pickler(pickle.Pickler):
+    """Pickler that stores all SX in `graphs` and notes code of users in `names_alone`."""
+
     def __init__(self, buffer: io.BytesIO) -> None:
+        """Open a pickle that is written to `buffer`."""
         super().__init__(buffer, protocol=pickle.HIGHEST_PROTOCOL)
         self.graphs: list[SX] = []
         self.names_alone = False
 
     def persistent_id(self, obj: Any) -> int | None:
+        """Return the index of an SX in `graphs`, to which it is added; None for other objects."""
         if not isinstance(obj, SX):
             return None
         self.graphs.append(obj)
         return len(self.graphs) - 1
 
     def reducer_override(self, obj: Any) -> Any:
+        """Set `names_alone` if `obj` is code of a user; return NotImplemented (default pickle)."""
         if isinstance(obj, (type, FunctionType)) and obj.__module__.split(".")[0] not in _KNOWN:
             self.names_alone = True
         if isinstance(obj, Function):  # a Callback of a user is in it by its name
@@ -92,9 +100,13 @@ class _Pickler(pickle.Pickler):
 
 
 class _Unpickler(pickle.Unpickler):
+    """Unpickler of a pickle by `_Pickler`, with its SX in `graphs`."""
+
     def __init__(self, buffer: io.BytesIO, graphs: list[SX]) -> None:
+        """Open the pickle in `buffer`, whose SX are `graphs`."""
         super().__init__(buffer)
         self._graphs = graphs
 
     def persistent_load(self, pid: Any) -> Any:
+        """Return the SX with index `pid` in `graphs`."""
         return self._graphs[pid]

@@ -11,17 +11,23 @@ from mbs.text import listed
 
 
 def report(system: SystemData) -> str:
-    """Return a text on a system.
+    """Return a text on an assembled system.
 
     The text gives the tree, the cut joints, the mobility, redundant rows, whether the cut forces
     are unique, the assembled configuration, parameters, forces and sensors.
+
+    Args:
+        system: assembled system.
     """
     every = [*_tree(system), *_loops(system), *_parameters(system), *_acting(system)]
     return "\n".join([*every, *_degrees(system)])
 
 
 def _degrees(system: SystemData) -> list[str]:
-    """Return a note if guesses look like degrees. The guess of an open system is its position."""
+    """Return a note, as a list of one line or none, if guesses look like degrees.
+
+    The guess of an open system is its position.
+    """
     names = [coordinate.name for coordinate in system.coordinates]
     given = dict(zip(names, system.configuration, strict=True))
     if system.closure is not None:
@@ -31,6 +37,7 @@ def _degrees(system: SystemData) -> list[str]:
 
 
 def _tree(system: SystemData) -> list[str]:
+    """Return the lines on the numbers of coordinates and on each link."""
     links = system.tree.links
     without = {
         row.coordinate: f"a {'slide' if row.slides else 'shaft'} of a drive line"
@@ -52,12 +59,17 @@ def _tree(system: SystemData) -> list[str]:
 
 
 def followed(joints: Sequence[str]) -> str:
-    """Return the sentence of a coupling: the first coordinate follows the others."""
+    """Return text on a coupling of coordinates, such as "j2 follows j1".
+
+    Args:
+        joints: names of the coordinates, the driven one first.
+    """
     driven, *others = joints
     return f"{driven} follows {' and '.join(others)}"
 
 
 def _loops(system: SystemData) -> list[str]:
+    """Return the lines on loops, couplings, mobility and motors."""
     if system.closure is None:
         return ["No loop: every coordinate is independent."]
     closure = system.closure
@@ -112,7 +124,7 @@ _SHOWN_POSITIONS, _SHOWN_MODES = 12, 3
 
 
 def _configuration(system: SystemData, closure: Closure) -> list[str]:
-    """The assembled configuration, the guess and other assembly modes."""
+    """Return the lines on the assembled configuration, the guess and other assembly modes."""
 
     def shown(q: Sequence[float]) -> str:
         pairs = zip(system.coordinates, q, strict=True)
@@ -149,6 +161,7 @@ _GUESSED = 1e-9
 
 
 def _parameters(system: SystemData) -> list[str]:
+    """Return a line with the parameters and their default values; none without parameters."""
     if not system.parameters:
         return []
     values = ", ".join(
@@ -174,5 +187,6 @@ def _acting(system: SystemData) -> list[str]:
 
 
 def _count(number: int, noun: str) -> str:
+    """Return number and noun as text, with the plural form of the noun."""
     plural = noun[:-1] + "ies" if noun.endswith("y") else noun + "s"
     return f"{number} {noun if number == 1 else plural}"

@@ -50,6 +50,7 @@ class System(SystemData):
             ) from error
 
     def _data(self) -> dict[str, Any]:
+        """Return the attributes without the cache, by name."""
         return {f.name: getattr(self, f.name) for f in fields(SystemData)}
 
     def __repr__(self) -> str:
@@ -83,22 +84,28 @@ class System(SystemData):
         return rate(q, v)
 
     def _rate_function(self) -> Function:
+        """Return the Function ``qdot(q, v)`` of the time derivative of the positions."""
         q, v = SX.sym("q", self.nq), SX.sym("v", self.nv)
         rate = casadi.densify(position_rate(self.tree, q, v))
         return Function("qdot", [q, v], [rate], ["q", "v"], ["qdot"])
 
     def cached(self, key: Any, build: Callable[[], Any]) -> Any:
-        """Return the cached value of a key. The first call computes it by `build()`."""
+        """Return the cached value of a key. The first call computes it.
+
+        Args:
+            key: hashable key.
+            build: callable that computes the value.
+        """
         with _BUILDING:
             if key not in self._cache:
                 self._cache[key] = build()
             return self._cache[key]
 
     def content(self) -> Packed | None:
-        """Return a pickle that identifies the content of the system in all processes.
+        """Return a pickle that identifies the content of the system in all processes, cached.
 
         Returns:
-            the pickle; None if the system contains code of a user.
+            the pickle; None if the system contains code of a user, or cannot be pickled.
         """
 
         def build() -> Packed | None:
@@ -232,4 +239,5 @@ class System(SystemData):
 
 
 def _unpickle(*parts: Any) -> System:
+    """Return the system of a pickle made by `System.__reduce__`."""
     return System(**unpacked(*parts))

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 from casadi import SX
 
+from mbs.assembly.component_instances import ComponentInstance, Quantity
 from mbs.assembly.drive_line import ShaftRow
 from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.parameter_bounds import BoundedField, Bounds
-from mbs.assembly.parts import ComponentInstance, Quantity
 from mbs.assembly.tables import (
     AttachedSensor,
     Balance,
@@ -170,7 +170,11 @@ class SystemData:
 
     @property
     def free(self) -> tuple[int, ...]:
-        """Indices of velocities whose positions are free: `active`, or those of rolling discs."""
+        """Indices of the velocities whose positions may be chosen independently.
+
+        They equal `active`, unless discs roll without slip: then more positions than velocities are
+        independent.
+        """
         return self.closure.free if self.closure else tuple(range(self.nv))
 
     @property

@@ -241,7 +241,11 @@ class Closure:
 
 
 def link_rows(tree: Tree) -> tuple[LinkRow, ...]:
-    """Return the links and the Khalil parameters of their frames."""
+    """Return the links of a tree and the Khalil parameters of their frames.
+
+    Args:
+        tree: the links.
+    """
     rows = []
     for number, link in enumerate(tree.links, start=1):
         *via, (gamma, b, alpha, d, theta, r) = (
@@ -258,14 +262,25 @@ def link_rows(tree: Tree) -> tuple[LinkRow, ...]:
 def position_coordinates(
     links: Sequence[tuple[Motion, str, Joint]], actuated: Sequence[bool], *, cut: bool = False
 ) -> tuple[Coordinate, ...]:
-    """Return the elements of q for motions (motion, name, joint)."""
+    """Return the elements of q of some joint motions.
+
+    Args:
+        links: motion, name of the motion and joint, in order.
+        actuated: whether each motion has a motor.
+        cut: whether the joints are cut, so that the coordinates are not in q.
+    """
     return _coordinates(_POSITIONS, links, actuated, cut)
 
 
 def velocity_coordinates(
     links: Sequence[tuple[Motion, str, Joint]], actuated: Sequence[bool]
 ) -> tuple[Coordinate, ...]:
-    """Return the elements of v for motions (motion, name, joint)."""
+    """Return the elements of v of some joint motions.
+
+    Args:
+        links: motion, name of the motion and joint, in order.
+        actuated: whether each motion has a motor.
+    """
     rows = _coordinates(_VELOCITIES, links, actuated, False)
     described = {joint.name: joint for _, _, joint in links}
     return tuple(
@@ -280,6 +295,10 @@ def _coordinates(
     actuated: Sequence[bool],
     cut: bool,
 ) -> tuple[Coordinate, ...]:
+    """Return the coordinates of joint motions; see `position_coordinates`.
+
+    `table` lists suffix, kind and unit of the coordinates of each type of motion.
+    """
     rows = []
     for (motion, name, joint), driven in zip(links, actuated, strict=True):
         limits = dict(joint.limits or ())
@@ -358,7 +377,12 @@ def joint_rows(
 def _part(
     mechanism: Description, joint: Joint, places: Places, symbols: Mapping[str, SX]
 ) -> WeldedPart | None:
-    """Return the bodies on the side of a weld without the world; None in a ring of welds."""
+    """Return the bodies on the side of a Fixed joint that does not contain the world.
+
+    None if other Fixed joints connect both sides as well.
+
+    `places` are link and pose of the frames, `symbols` those of the parameters.
+    """
     sides = {port: _weld(mechanism, joint, port) for port in "ab"}
     if (joint.name, "a") in sides["b"]:
         return None
@@ -375,7 +399,7 @@ def _part(
 
 
 def _weld(mechanism: Description, joint: Joint, port: str) -> list[Port]:
-    """Return the ports welded to one frame of a joint, except through the joint itself."""
+    """Return the ports welded to the frame `port` of a joint, except through the joint itself."""
     found: dict[Port, None] = {(joint.name, port): None}
     queue = deque(found)
     while queue:
@@ -388,6 +412,7 @@ def _weld(mechanism: Description, joint: Joint, port: str) -> list[Port]:
 
 
 def _neighbours(mechanism: Description, without: Joint, port: Port) -> Iterator[Port]:
+    """Yield the ports that are welded directly to a port, except through the joint `without`."""
     for a, b in mechanism.connections:
         ends = (a.owner.name, a.port), (b.owner.name, b.port)
         if port in ends:
@@ -423,13 +448,21 @@ class CoordinateCoupling:
         return (self.driven, self.driver, *(number for number, _ in self.others))
 
     def value(self, q: SX) -> SX:
-        """Return the value of the driven coordinate for positions of the other coordinates."""
+        """Return the value of the driven coordinate, (1, 1).
+
+        Args:
+            q: (nq, 1) positions; the driven position is not used.
+        """
         driver = q[self.driver]
         value = sum((c * driver**k for k, c in enumerate(self.coefficients)), SX(0))
         return value + self.shift(q)
 
     def shift(self, q: SX) -> SX:
-        """Return the sum of the further coordinates times their factors."""
+        """Return the sum of the further coordinates times their factors, (1, 1).
+
+        Args:
+            q: (nq, 1) positions.
+        """
         return sum((factor * q[number] for number, factor in self.others), SX(0))
 
 
@@ -510,7 +543,11 @@ class AttachedSensor:
 
 
 def sensors_of(mechanism: Description) -> Iterator[Sensor]:
-    """Yield all sensors, in the order of their addition."""
+    """Yield all sensors of a mechanism, in the order of their addition.
+
+    Args:
+        mechanism: components and connections.
+    """
     return (c for c in mechanism.components.values() if isinstance(c, Sensor))
 
 
@@ -548,6 +585,10 @@ def attached_sensors(
 def _on_points(
     mechanism: Description, sensor: Sensor, places: Places, symbols: Mapping[str, SX]
 ) -> AttachedSensor:
+    """Return a sensor with the links and poses of its points.
+
+    `places` are link and pose of bodies and joint frames.
+    """
     frames = []
     for point in sensor.points:
         require_part(mechanism, sensor, point, "is on")
@@ -566,6 +607,10 @@ def _on_points(
 def _on_joint(
     mechanism: Description, sensor: OnJoint, joints: Sequence[JointRow]
 ) -> AttachedSensor:
+    """Return a sensor with its joint and the frames of this joint, from the table `joints`.
+
+    Raises AssemblyError if the joint is unknown or not in the table.
+    """
     names = [row.name for row in joints]
     if sensor.joint not in names:
         known = {joint.name for joint in mechanism.joints()}
@@ -586,6 +631,10 @@ def _on_joint(
 def _on_coordinate(
     sensor: JointSensor, tables: tuple[Sequence[Coordinate], ...], joints: Sequence[JointRow]
 ) -> AttachedSensor:
+    """Return a sensor with the coordinate that it measures; AssemblyError if it is unknown.
+
+    `tables` are the coordinates of q, of v, and of cut joints.
+    """
     q, v, cut = ({row.name: row for row in table} for table in tables)
     name = sensor.joint
     balls = {row.name: row for row in joints if row.cut and row.kind == "spherical"}
@@ -613,7 +662,10 @@ def _on_coordinate(
 def _require_names(
     sensors: Sequence[AttachedSensor], tables: tuple[Sequence[Coordinate], ...]
 ) -> None:
-    """Raise AssemblyError if two readings have the same name, in Functions or in results."""
+    """Raise AssemblyError if two readings have the same name, in Functions or in results.
+
+    `tables` are the coordinates of q, of v, and of cut joints.
+    """
     owners = dict.fromkeys(_INPUTS, "an input of the models")
     columns = {
         f"{row.name}.{kind}": f"coordinate {row.name}"

@@ -91,7 +91,7 @@ class Link:
         return *self.via, self.placement
 
     def pose(self) -> Pose:
-        """Return frame j relative to frame i at the zero position of the motion."""
+        """Return the pose of frame j relative to frame i at the zero position of the motion."""
         pose = self.placement.pose()
         for frame in reversed(self.via):
             pose = frame.pose() @ pose
@@ -121,7 +121,11 @@ class Tree:
         return self.links[-1].v.stop if self.links else 0
 
     def path(self, j: int) -> list[int]:
-        """Return the link indices on the path from the base to link j; empty for the base (-1)."""
+        """Return the link indices on the path from the base to a link, in this order.
+
+        Args:
+            j: index of the link; the path is empty for the base (-1).
+        """
         numbers = []
         while j >= 0:
             numbers.append(j)
@@ -133,11 +137,18 @@ class Tree:
 
 
 def position_rate(tree: Tree, q: SX, v: SX) -> SX:
-    """Return the time derivative of the positions (nq, 1), equal to v without quaternions."""
+    """Return the time derivative (nq, 1) of the positions; it equals v without quaternions.
+
+    Args:
+        tree: the links.
+        q: (nq, 1) positions.
+        v: (nv, 1) velocities.
+    """
     return casadi.vertcat(*(_rate(link, q[link.q], v[link.v]) for link in tree.links))
 
 
 def _rate(link: Link, q: SX, v: SX) -> SX:
+    """Return the time derivative (nq, 1) of the positions q of one link at its velocities v."""
     match link.motion:
         case Motion.SPHERICAL:
             return quaternion_rate(q, v)
@@ -148,7 +159,11 @@ def _rate(link: Link, q: SX, v: SX) -> SX:
 
 
 def quaternion_slices(tree: Tree) -> list[slice]:
-    """Return the slice of each unit quaternion in q."""
+    """Return the slice of each unit quaternion in q.
+
+    Args:
+        tree: the links.
+    """
     found = {Motion.SPHERICAL: 0, Motion.FREE: 3}
     return [
         slice(link.q.start + found[link.motion], link.q.stop)
@@ -158,18 +173,33 @@ def quaternion_slices(tree: Tree) -> list[slice]:
 
 
 def norm_rows(tree: Tree, q: SX) -> SX:
-    """Return (k, 1) squared length minus one of every quaternion in the positions q (nq, 1)."""
+    """Return the squared length minus one of every quaternion in q, (k, 1).
+
+    Args:
+        tree: the links.
+        q: (nq, 1) positions.
+    """
     rows = [norm for _, norm in norms_of(tree, q)]
     return casadi.vertcat(*rows) if rows else SX(0, 1)
 
 
 def norms_of(tree: Tree, q: SX) -> list[tuple[slice, SX]]:
-    """Return the slice of each unit quaternion in q, and its squared length minus one."""
+    """Return the slice of each unit quaternion in q, and its squared length minus one.
+
+    Args:
+        tree: the links.
+        q: (nq, 1) positions.
+    """
     return [(part, casadi.sumsqr(q[part]) - 1) for part in quaternion_slices(tree)]
 
 
 def normalised(tree: Tree, q: SX) -> SX:
-    """Return the positions with quaternions normalised to unit length."""
+    """Return the positions (nq, 1) with quaternions scaled to unit length.
+
+    Args:
+        tree: the links.
+        q: (nq, 1) positions.
+    """
     result = SX(q)
     for part in quaternion_slices(tree):
         result[part] = q[part] / casadi.sqrt(casadi.sumsqr(q[part]))
@@ -177,7 +207,11 @@ def normalised(tree: Tree, q: SX) -> SX:
 
 
 def zero_position(tree: Tree) -> list[float]:
-    """Return positions with every joint at zero and quaternions at the identity."""
+    """Return the positions (nq,) with every joint at zero and quaternions at the identity.
+
+    Args:
+        tree: the links.
+    """
     q = [0.0] * tree.nq
     for part in quaternion_slices(tree):
         q[part.start] = 1.0

@@ -80,6 +80,7 @@ def quaternion_rows(system: System, q: SX, parts: Iterable[slice]) -> list[Valid
 
 
 def _parameter_rows(system: System) -> list[ValidityRow]:
+    """Return the conditions that parameters are within their bounds."""
     symbols = system.symbol_table
     bounds = system.bounds.items()
     return [row for name, own in bounds for row in _bound_rows(name, symbols[name], own)]
@@ -95,6 +96,7 @@ def field_rows(system: System) -> list[ValidityRow]:
 
 
 def _bound_rows(name: str, value: SX, bounds: Bounds) -> list[ValidityRow]:
+    """Return the conditions that a value named `name` is within its bounds: none, one or two."""
     low, high = bounds
     rows = []
     if low is not None:

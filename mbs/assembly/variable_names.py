@@ -79,11 +79,11 @@ _REVOLUTION = 2 * math.pi
 
 
 def like_degrees(coordinates: Iterable[Coordinate], given: object) -> str:
-    """Return a note on the angles that look like degrees; empty if none does.
+    """Return a note on angles that look like degrees instead of radians; empty if none do.
 
     Args:
         coordinates: coordinates of the system.
-        given: positions by name; anything else gives no note.
+        given: positions by name. The note is empty for an argument of another type.
     """
     if not isinstance(given, Mapping):
         return ""
@@ -99,6 +99,7 @@ def like_degrees(coordinates: Iterable[Coordinate], given: object) -> str:
 
 
 def _looks_like_degrees(coordinate: Coordinate, angle: float) -> bool:
+    """Whether an angle [rad] is far outside the limits of its coordinate, or very large."""
     if coordinate.unit != "rad":
         return False
     if coordinate.limits is None:

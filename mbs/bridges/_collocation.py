@@ -115,6 +115,10 @@ def constraint_residuals(model: Dae, x: MX, p: Any = None) -> MX:
 
 
 def _nodes(points: int, scheme: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Return the collocation points (points,) in a stage of length 1.
+
+    Raises ModelError for an unknown scheme or more than nine points.
+    """
     if scheme not in SCHEMES:
         raise ModelError(f"scheme is {quoted(scheme)}; use one of {', '.join(SCHEMES)}")
     if points > 9:
@@ -123,12 +127,18 @@ def _nodes(points: int, scheme: str) -> np.ndarray[Any, np.dtype[np.float64]]:
 
 
 def _widths(points: int, count: int, scheme: str) -> list[tuple[str, int]]:
-    """Return the numbers of columns of x, z and u; knots at points are not variables."""
+    """Return (name, number of columns) of the variables x, z and u for `count` stages.
+
+    Knots that are collocation points are not separate variables.
+    """
     return [("x", 1 if scheme == "radau" else count + 1), ("z", points * count), ("u", count)]
 
 
 def _residual(model: Model) -> Function:
-    """``residual(x, rate, z, u, p, h)``: h dx/dt - rate (in normalised stage time), then alg."""
+    """Return the Function ``residual(x, rate, z, u, p, h)`` of the equations at one point.
+
+    Its rows are h dx/dt - rate, with the rate per stage length, then the algebraic equations.
+    """
     names = ["x", "rate", "z", "u", "p", "h"]
     if isinstance(model, Dae):
         rate, h = casadi.SX.sym("rate", model.x.numel()), casadi.SX.sym("h")
@@ -143,6 +153,7 @@ def _residual(model: Model) -> Function:
 
 
 def _combine(basis: list[MX], weights: np.ndarray[Any, Any]) -> MX:
+    """Return the sum of the matrices in `basis`, each times a number in `weights`; same shape."""
     terms = [float(w) * b for w, b in zip(weights, basis, strict=True)]
     total: MX = sum(terms[1:], terms[0])
     return total

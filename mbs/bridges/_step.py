@@ -89,7 +89,10 @@ def _flag(dae: Dae, x: Any, inputs: Sequence[Any]) -> Any:
 
 
 def _settle(dae: Dae, checked: bool) -> Function | None:
-    """``settle(x, middle, end, p, h) -> x``: correction after a substep; None if not needed."""
+    """Return ``settle(x, middle, end, p, h) -> x``: correction of the states after a substep.
+
+    x are the states at its start. None if the Dae has neither invariants nor loops.
+    """
     closed = dae.x.numel() < dae.q.numel() + dae.v.numel()
     if not dae.invariants.numel() and not closed:
         return None
@@ -116,7 +119,7 @@ def _settle(dae: Dae, checked: bool) -> Function | None:
 
 
 def _correction(dae: Dae) -> Function:
-    """``correction(x, p)``: minimum-norm Newton step that reduces the invariants to zero."""
+    """Return ``correction(x, p)``: minimum-norm Newton step towards zero invariants."""
     J = casadi.jacobian(dae.invariants, dae.x)
     square = casadi.mtimes(J, J.T)
     # regularisation for dependent rows in some configurations

@@ -17,6 +17,9 @@ Model = Dae | Function
 def require_dae(model: object) -> Dae:
     """Return the model, or raise if it is not a Dae.
 
+    Args:
+        model: any object.
+
     Raises:
         ModelError: the model is not a Dae; the message describes the required argument.
     """
@@ -52,6 +55,7 @@ def explicit(model: Model) -> Function:
 
 
 def _check(model: Function) -> None:
+    """Raise ModelError unless a model is a Function of (x, u) or (x, u, p) that returns dx/dt."""
     if not isinstance(model, Function):
         raise ModelError(
             f"{quoted(model)} has no equations; give mbs.models.dae(system), or a Function"

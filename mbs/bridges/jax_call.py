@@ -56,6 +56,7 @@ def jax_function(function: Function) -> Callable[..., Any]:
 
 
 def _jax() -> Any:
+    """Return the module jax. Raise ModelError if it is not installed or uses 32 bits."""
     try:
         jax = importlib.import_module("jax")
     except ImportError as error:
@@ -68,7 +69,10 @@ def _jax() -> Any:
 
 
 def _differentiable(jax: Any, function: Function, machine: Batch) -> _Outputs:
-    """Return a callable of the outputs with a JVP rule, which JAX uses for all derivatives."""
+    """Return a JAX callable of the outputs with a rule for forward derivatives (JVP).
+
+    JAX uses the rule for all derivatives. `machine` is the compiled batch of `function`.
+    """
     values = _on_host(jax, machine)
     slopes: list[_Outputs] = []
 
@@ -87,7 +91,7 @@ def _differentiable(jax: Any, function: Function, machine: Batch) -> _Outputs:
 
 
 def _slopes(jax: Any, function: Function) -> _Outputs:
-    """Return a callable of Jacobian-vector products, summed over the inputs, for every output."""
+    """Return a callable (points, directions) of the Jacobian-vector products of every output."""
     inputs, outputs = function.n_in(), function.n_out()
     point = function.mx_in()
     blocks = function.jacobian().call([*point, *function.call(point)])
@@ -110,16 +114,16 @@ def _slopes(jax: Any, function: Function) -> _Outputs:
 
 
 def _shape(column: Any, size: tuple[int, int]) -> Any:
-    """Reshape a column-major stacked output to a vector or matrix."""
+    """Return an output, stacked column by column, as a vector or as a matrix of this size."""
     rows, columns = size
     return column if columns == 1 else column.reshape(columns, rows).T
 
 
 def _vectors(jax: Any, machine: Batch, given: Sequence[Any]) -> list[Any]:
-    """Return every input as a vector.
+    """Return every input as a vector (n,).
 
     Raises:
-        ModelError: an input has another size.
+        ModelError: an input has another size than the compiled batch requires.
     """
     arrays = [jax.numpy.asarray(value, dtype=float).reshape(-1) for value in given]
     for port, array in zip(machine.inputs, arrays, strict=True):
@@ -132,7 +136,10 @@ def _vectors(jax: Any, machine: Batch, given: Sequence[Any]) -> list[Any]:
 
 
 def _on_host(jax: Any, machine: Batch) -> _Outputs:
-    """Return a host callback of the compiled code; the points of a `vmap` are rows of one batch."""
+    """Return a JAX callable that evaluates compiled code on the host.
+
+    The points of a `vmap` are the rows of one batch.
+    """
     wanted = tuple(jax.ShapeDtypeStruct(port.shape, np.float64) for port in machine.outputs)
 
     def evaluate(*points: Any) -> tuple[NDArray[np.float64], ...]:
@@ -153,7 +160,10 @@ def _on_host(jax: Any, machine: Batch) -> _Outputs:
 
 
 def _rows(array: NDArray[np.float64], lead: tuple[int, ...]) -> NDArray[np.float64]:
-    """Return points as rows, or one vector if all points are equal."""
+    """Return points (..., n) as rows (N, n), or one vector if all points are equal.
+
+    `lead` are the leading dimensions of all inputs together.
+    """
     size = array.shape[-1]
     if array.size == size:
         return array.reshape(size)

@@ -69,7 +69,12 @@ class Grid:
         return MX(self.duration) / self.stages
 
     def mapped(self, function: Function, columns: int) -> Function:
-        """Return the stage Function (compiled or interpreted), mapped over `columns` columns."""
+        """Return the stage Function, compiled or interpreted, mapped over many columns.
+
+        Args:
+            function: Function of one stage or point.
+            columns: number of columns.
+        """
         threads = cores() if self.parallel == "thread" else columns
         mapped: Function = CODES[self.code](function).map(columns, self.parallel, threads)
         return mapped
@@ -137,6 +142,12 @@ class Transcription:
         of stage length times value. Values of stages (1, stages), such as a row of u, are constant
         on each stage, so the integral is exact.
 
+        Args:
+            values: (1, points) or (1, stages) values.
+
+        Returns:
+            (1, 1) integral.
+
         Raises:
             ModelError: the values do not have one of these shapes.
         """
@@ -176,28 +187,44 @@ class Transcription:
             self._set("z", self._repeat(rows))
 
     def _set(self, name: str, values: NDArray[np.float64]) -> None:
+        """Set the initial guess of the variables `name`, unless there are none."""
         if values.size:
             self.opti.set_initial(self.variables[name], values)
 
     def _repeat(self, knots: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return values at the points inside stages: those of the knot at the end of the stage."""
         return np.repeat(knots[:, 1:], len(self.weights), axis=1)
 
 
 def elements_of(model: Model) -> Mapping[str, tuple[tuple[str, str], ...]]:
-    """Return the (name, unit) of the rows of a Dae; empty for a Function."""
+    """Return (name, unit) of the rows of x, z, u and p of a Dae; empty for a Function.
+
+    Args:
+        model: equations of motion.
+    """
     return model.elements if isinstance(model, Dae) else {}
 
 
 def variable(opti: Opti, rows: int, columns: int) -> MX:
-    """Return an Opti variable, or an empty matrix if it has no rows.
+    """Return an Opti variable (rows, columns), or an empty matrix if it has no rows.
 
     `opti.initial` does not accept variables without rows.
+
+    Args:
+        opti: problem that receives the variable.
+        rows: number of rows.
+        columns: number of columns.
     """
     return opti.variable(rows, columns) if rows else MX(0, columns)
 
 
 def require_counts(opti: Any, grid: Any, **counts: Any) -> None:
     """Raise if an argument is not an Opti, not a Grid or not a positive integer.
+
+    Args:
+        opti: problem.
+        grid: time grid.
+        **counts: numbers that must be positive integers, by name.
 
     Raises:
         ModelError: the message describes the required argument.
@@ -211,7 +238,13 @@ def require_counts(opti: Any, grid: Any, **counts: Any) -> None:
 
 
 def parameter_values(model: Model, count: int, p: Any) -> MX:
-    """Return the parameters (np, 1) of a model: the given values, or the default values of a Dae.
+    """Return the parameters (np, 1) of a model as numbers or expressions.
+
+    Args:
+        model: equations of motion.
+        count: number np of parameters.
+        p: values as numbers, an expression, or a dict by name; None for the default values of a
+            Dae.
 
     Raises:
         ModelError: no values are given to a Function with parameters, their number differs from
@@ -229,6 +262,10 @@ def parameter_values(model: Model, count: int, p: Any) -> MX:
 
 
 def _by_name(model: Dae, given: Mapping[str, float]) -> NDArray[np.float64]:
+    """Return the parameters (np,) of a Dae: values by name, and default values.
+
+    Raises ModelError for an unknown name.
+    """
     names = [name for name, _ in model.elements["p"]]
     values = np.array(model.p0)
     for name, value in given.items():
@@ -239,15 +276,15 @@ def _by_name(model: Dae, given: Mapping[str, float]) -> NDArray[np.float64]:
 
 
 def _require_count(what: str, count: Any) -> None:
+    """Raise ModelError unless `count` is a positive integer; `what` is its name."""
     if isinstance(count, bool) or not isinstance(count, int) or count < 1:
         raise ModelError(f"{what} is {quoted(count)}; use 1 or more")
 
 
 def _columns(name: str, values: ArrayLike, shape: tuple[int, int]) -> NDArray[np.float64]:
-    """Return a guess as an array of the full shape; a single column is repeated.
+    """Return the guess `values` of the variables `name` as an array of this shape.
 
-    Raises:
-        ModelError: the guess has another shape.
+    A single column is repeated. Raises ModelError if the guess has another shape.
     """
     try:
         array = np.array(values, dtype=float)

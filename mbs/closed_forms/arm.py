@@ -51,28 +51,52 @@ class Arm:
 
     @property
     def between(self) -> list[Array]:
-        """Constant transforms `gaps`, as a list."""
+        """Constant transforms `gaps` as a list, under the name that `transforms` uses."""
         return list(self.gaps)
 
     def displacements(self, q: Array) -> list[Array]:
-        """Return the displacements (..., 4, 4) of all joints at q (..., n) [rad or m]."""
+        """Return the displacement (..., 4, 4) of each joint about or along its own z axis.
+
+        Args:
+            q: (..., n) positions of the joints [rad or m].
+        """
         return [motion(q[..., k], bool(self.prismatic[k])) for k in range(self.size)]
 
     def wrapped(self, way: Array) -> Array:
-        """Return differences (..., n) of configurations, with angles in [-pi, pi)."""
+        """Return differences of configurations with angles in [-pi, pi).
+
+        Args:
+            way: (..., n) differences of positions [rad or m].
+        """
         return np.where(self.prismatic, way, np.mod(way + np.pi, 2 * np.pi) - np.pi)
 
     def residual(self, q: Array, T: Array) -> Array:
-        """Return the largest element of |pose(q) - T| (...) [m or 1] at q (..., n)."""
+        """Return the largest element of |pose(q) - T| (...) [m or 1].
+
+        Args:
+            q: (..., n) positions of the joints [rad or m].
+            T: (..., 4, 4) target poses of the end frame in the base [m].
+        """
         error: Array = np.max(np.abs(self.pose(q) - T), axis=(-2, -1))
         return error
 
     def pose(self, q: Array) -> Array:
-        """Return the poses (..., 4, 4) of the end frame at configurations q (..., n) [rad or m]."""
+        """Return the poses (..., 4, 4) of the end frame in the base frame [m].
+
+        Args:
+            q: (..., n) positions of the joints [rad or m].
+        """
         return transforms(self, np.asarray(q, dtype=float))[-1]
 
     def pose_and_jacobian(self, q: Array) -> tuple[Array, Array]:
-        """Return poses and Jacobians (..., 6, n) of [V; w] of the end frame, in the base."""
+        """Return poses (..., 4, 4) and Jacobians (..., 6, n) of the end frame.
+
+        The Jacobian maps joint velocities to [V; w]: velocity of the end-frame origin and angular
+        velocity, in base axes.
+
+        Args:
+            q: (..., n) positions of the joints [rad or m].
+        """
         T, axes, origins = self._frames(q)
         arms = T[..., None, :3, 3] - origins
         turning = np.where(self.prismatic[:, None], 0.0, axes)
@@ -80,11 +104,18 @@ class Arm:
         return T, np.swapaxes(np.concatenate([linear, turning], axis=-1), -1, -2)
 
     def lines(self, q: Array) -> tuple[Array, Array]:
-        """Return directions of all axes and a point on each, (..., n, 3) [m], in the base."""
+        """Return the unit direction (..., n, 3) of each joint axis and a point on it, in the base.
+
+        Args:
+            q: (..., n) positions of the joints [rad or m].
+        """
         return self._frames(q)[1:]
 
     def _frames(self, q: Array) -> tuple[Array, Array, Array]:
-        """Return the poses, and axes and origins of all joints (..., n, 3), in the base."""
+        """Return end poses, and axes and origins (..., n, 3) of all joints in the base frame.
+
+        q (..., n) are positions of the joints; the poses are (..., 4, 4).
+        """
         q = np.asarray(q, dtype=float)
         *frames, T = transforms(self, q)
         axes, origins = np.empty((*q.shape, 3)), np.empty((*q.shape, 3))
@@ -109,7 +140,12 @@ def arm_of(chain: Chain, symbols: SX, p: Array) -> Arm:
 
 
 def motion(q: Field, prismatic: bool) -> Field:
-    """Return (..., 4, 4) translations along z by q [m], or rotations about z by q [rad]."""
+    """Return the displacement (..., 4, 4) of a joint along or about its z axis.
+
+    Args:
+        q: (...) translations [m] for a prismatic joint, rotations [rad] otherwise.
+        prismatic: whether the joint is prismatic.
+    """
     T = np.empty((*np.shape(q), 4, 4), np.result_type(q, float))
     T[...] = np.eye(4)
     if prismatic:
@@ -121,7 +157,11 @@ def motion(q: Field, prismatic: bool) -> Field:
 
 
 def inverse(T: Field) -> Field:
-    """Return the inverses (..., 4, 4) of rigid transforms."""
+    """Return the inverses of rigid transforms.
+
+    Args:
+        T: (..., 4, 4) rigid transforms.
+    """
     back = np.zeros_like(T)
     R = np.swapaxes(T[..., :3, :3], -1, -2)
     back[..., :3, :3], back[..., 3, 3] = R, 1.0
@@ -136,10 +176,14 @@ so that only seven digits remain."""
 
 
 def gap_to(target: Array, T: Array) -> Array:
-    """Return translation [m] and rotation vector [rad] (..., 6) from poses T to the target.
+    """Return the displacement (..., 6) from poses to a target: translation, rotation vector.
 
-    To first order it is the [V; w] that reaches the target in unit time. It is zero at the target
-    pose only.
+    Both are in base axes [m, rad]. To first order it is the [V; w] that reaches the target in unit
+    time. It is zero at the target pose only.
+
+    Args:
+        target: (..., 4, 4) target poses.
+        T: (..., 4, 4) poses.
     """
     R = target[..., :3, :3] @ np.swapaxes(T[..., :3, :3], -1, -2)
     vector = np.stack(
@@ -158,7 +202,7 @@ def gap_to(target: Array, T: Array) -> Array:
 
 
 def _half_turn_axis(R: Array) -> Array:
-    """Return the axes (..., 3) of rotations by pi."""
+    """Return the unit axes (..., 3) of rotation matrices R (..., 3, 3) of angle pi."""
     B = 0.5 * (R + np.eye(3))
     column = np.argmax(B[..., range(3), range(3)], axis=-1)
     axis: Array = np.take_along_axis(B, column[..., None, None], axis=-1)[..., 0]

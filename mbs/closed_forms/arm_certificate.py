@@ -18,9 +18,14 @@ from numpy.typing import NDArray
 
 from mbs.closed_forms.arm import Arm, Array, inverse, motion
 from mbs.closed_forms.arm_search import General, general, random_configurations
-from mbs.closed_forms.raghavan_roth.numbers import (
+from mbs.closed_forms.displacement_matrices import (
     KEPT_BY_SLIDE,
     KEPT_BY_TURN,
+    frame_products,
+    motion_parts,
+    rho,
+)
+from mbs.closed_forms.raghavan_roth.numbers import (
     Arrangement,
     Prepared,
     at,
@@ -28,9 +33,6 @@ from mbs.closed_forms.raghavan_roth.numbers import (
     for_poses,
     loop_length,
     middle_joints,
-    motion_parts,
-    pair,
-    rho,
 )
 from mbs.closed_forms.roots import Roots
 from mbs.solvers.homotopy import solved
@@ -52,11 +54,18 @@ intersect or are parallel: this is structural and leaves 1e-14."""
 
 
 def complex_candidates(prepared: Prepared, T: Array) -> Complex:
-    """Return complex configurations (m, 6) [rad or m] near which an arm may reach T (4, 4) [m]."""
+    """Return complex configurations (m, 6) near which an arm may reach a pose [rad or m].
+
+    They are approximate; `certified_roots` refines them.
+
+    Args:
+        prepared: arm prepared for the general method.
+        T: (4, 4) target pose [m].
+    """
     prepared = for_poses(prepared, T[None])[0][0]
     loop = prepared.arrangement
-    ways = loop.all_ways(T[None])
-    M = prepared.pencil.matrices(ways)
+    transforms = loop.transforms_for(T[None])
+    M = prepared.pencil.matrices(transforms)
     u = complex_roots(M)[0]
     u = u[np.abs(u.imag) < _FAR_ANGLE]
     matrices = at(np.repeat(M, len(u), axis=0), u)
@@ -70,19 +79,27 @@ def complex_candidates(prepared: Prepared, T: Array) -> Complex:
             x3 = np.repeat(np.tan(u[own] / 2), count)
             x = np.column_stack([x3, x4.ravel(), x5.ravel()])
             middle = np.where(loop.prismatic[2:5], x, 2 * np.arctan(x.astype(complex)))
-            every.append(_completed(ways[0], loop, middle[np.all(np.isfinite(middle), axis=1)]))
+            every.append(
+                _completed(transforms[0], loop, middle[np.all(np.isfinite(middle), axis=1)])
+            )
     whole = np.concatenate(every)
     return whole[np.all(np.isfinite(whole), axis=1)]
 
 
-def _completed(ways: Array, loop: Arrangement, middle: Complex) -> Complex:
-    """Return arm configurations (m, 6) for positions (n, 3) of joints 3, 4 and 5 of its loop."""
-    beyond, goal = np.tile(ways[1].astype(np.complex128), (len(middle), 1, 1)), inverse(ways[5])
+def _completed(transforms: Array, loop: Arrangement, middle: Complex) -> Complex:
+    """Return arm configurations (m, 6) for positions (n, 3) of joints 3, 4 and 5 of its loop.
+
+    `transforms` (6, 4, 4) are the constant transforms of the loop.
+    """
+    beyond, goal = (
+        np.tile(transforms[1].astype(np.complex128), (len(middle), 1, 1)),
+        inverse(transforms[5]),
+    )
     for k in (2, 3, 4):
-        beyond = beyond @ motion(middle[:, k - 2], bool(loop.prismatic[k])) @ ways[k]
-    number, second = _second(ways[0], loop.prismatic, beyond, goal)
-    near = ways[0] @ motion(second, bool(loop.prismatic[1])) @ beyond[number]
-    first = _first(bool(loop.prismatic[0]), near, goal)
+        beyond = beyond @ motion(middle[:, k - 2], bool(loop.prismatic[k])) @ transforms[k]
+    number, second = _second_positions(transforms[0], loop.prismatic, beyond, goal)
+    near = transforms[0] @ motion(second, bool(loop.prismatic[1])) @ beyond[number]
+    first = _first_positions(bool(loop.prismatic[0]), near, goal)
     left = inverse(motion(first, bool(loop.prismatic[0])) @ near) @ goal
     sixth = _angle(left[:, 0, 0] + left[:, 1, 1], left[:, 1, 0] - left[:, 0, 1])
     whole = np.column_stack([first, second, middle[number], sixth])
@@ -93,15 +110,15 @@ def _completed(ways: Array, loop: Arrangement, middle: Complex) -> Complex:
 
 
 def _angle(c: Complex, s: Complex) -> Complex:
-    """Return the complex angle whose cosine and sine are c and s, up to one factor."""
+    """Return the complex angle whose cosine and sine are c and s times one common factor."""
     q: Complex = -0.5j * np.log((c + 1j * s) / (c - 1j * s))
     # half the logarithm of a square is unique up to pi: the sign of the cosine decides
     size = np.where(np.abs(np.cos(q)) > np.abs(np.sin(q)), c / np.cos(q), s / np.sin(q))
     return np.where(np.real(size) < 0, q + np.pi, q)
 
 
-def _first(prismatic: bool, near: Complex, goal: Array) -> Complex:
-    """Return positions (n,) of joint 1 that move the origin and z axis of `near` to the goal."""
+def _first_positions(prismatic: bool, near: Complex, goal: Array) -> Complex:
+    """Return positions (n,) of joint 1 that move origin and z axis of poses `near` to `goal`."""
     if prismatic:
         slide: Complex = goal[2, 3] - near[:, 2, 3]
         return slide
@@ -112,16 +129,20 @@ def _first(prismatic: bool, near: Complex, goal: Array) -> Complex:
     return _angle(np.sum(x * X + y * Y, axis=1) / square, np.sum(x * Y - y * X, axis=1) / square)
 
 
-def _second(
+def _second_positions(
     way: Array, prismatic: NDArray[np.bool_], beyond: Complex, goal: Array
 ) -> tuple[NDArray[np.int64], Complex]:
-    """Return row indices and positions of joint 2: two per row if only one equation exists."""
+    """Return row indices and positions of joint 2, for poses `beyond` (n, 4, 4) that it moves.
+
+    `way` is the transform from joint 1 to joint 2, `goal` the target pose. A row has two positions
+    if only one equation exists.
+    """
     kept = KEPT_BY_SLIDE if prismatic[0] else KEPT_BY_TURN
-    moved = np.einsum("iab,nb->nai", motion_parts(bool(prismatic[1])), pair(beyond))
+    moved = np.einsum("iab,nb->nai", motion_parts(bool(prismatic[1])), frame_products(beyond))
     A = (rho(way) @ moved)[:, kept]
     A = np.where(np.all(np.isfinite(A), axis=(1, 2), keepdims=True), A, 0.0)
     U, s, Vh = np.linalg.svd(A[:, :, 1:], full_matrices=False)
-    g = np.einsum("nai,na->ni", U.conj(), pair(goal)[kept] - A[:, :, 0])
+    g = np.einsum("nai,na->ni", U.conj(), frame_products(goal)[kept] - A[:, :, 0])
     used = s > _FLAT * s[:, :1]
     flat = np.flatnonzero(~used[:, 1])
     g = np.where(used, g / np.where(used, s, 1.0), 0.0)
@@ -132,7 +153,7 @@ def _second(
 
 
 def _crossings(prismatic: bool, n: Complex, g: Complex) -> tuple[Complex, Complex]:
-    """Return both roots of n0 r + n1 r^2 = g, or of n0 cos q + n1 sin q = g."""
+    """Return both roots q of n0 cos q + n1 sin q = g, or of n0 q + n1 q^2 = g if prismatic."""
     if not prismatic:
         # (n0 - i n1) z^2 - 2 g z + n0 + i n1 = 0 with z = e^(i q)
         root, below = np.sqrt(g**2 - n[:, 0] ** 2 - n[:, 1] ** 2), n[:, 0] - 1j * n[:, 1]
@@ -181,7 +202,7 @@ class CertifiedRoots:
 
 
 def certified_roots(arm: Arm, T: Array, candidates: Complex) -> CertifiedRoots:
-    """Return the certified roots near candidates, each once.
+    """Return the roots of the pose equations that are certified to lie near candidates, each once.
 
     For a change d of a configuration, X = e^(S4 d4) e^(S5 d5) e^(S6 d6) X0 e^(S1 d1) e^(S2 d2)
     e^(S3 d3), where S are the joint twists relative to the middle of the arm. The second derivative
@@ -194,17 +215,17 @@ def certified_roots(arm: Arm, T: Array, candidates: Complex) -> CertifiedRoots:
         candidates: (m, 6) complex configurations [rad or m].
     """
     length = loop_length(arm)
-    inner, target = _inner(arm, T, length)
+    inner, target = _without_base_and_tool(arm, T, length)
     q = np.where(arm.prismatic, candidates / length, candidates)
     with np.errstate(all="ignore"):
         for _ in range(_NEWTON):
-            rows, J, *_ = _rows(inner, target, q)
+            rows, J, *_ = _pose_equations(inner, target, q)
             finite = np.all(np.isfinite(J), axis=(1, 2)) & np.all(np.isfinite(rows), axis=1)
             q, rows, J = q[finite], rows[finite], J[finite]
             q = q - solved(J, rows[..., None])[..., 0]
         # rounding may have spoilt one of two conjugate roots
         q = np.concatenate([q, q.conj()])
-        rows, J, norms, gap = _rows(inner, target, q)
+        rows, J, norms, gap = _pose_equations(inner, target, q)
         W = solved(J, np.broadcast_to(np.eye(6, dtype=np.complex128), J.shape))
         gain = np.sum(norms * np.linalg.norm(W, axis=2), axis=1)
         step = np.sum(norms * np.abs(np.einsum("mij,mj->mi", W, rows)), axis=1)
@@ -221,8 +242,8 @@ def certified_roots(arm: Arm, T: Array, candidates: Complex) -> CertifiedRoots:
     return CertifiedRoots(q[kept], radius[kept])
 
 
-def _inner(arm: Arm, T: Array, length: float) -> tuple[Arm, Array]:
-    """Return the arm between its first and last joint, with lengths divided, and its target."""
+def _without_base_and_tool(arm: Arm, T: Array, length: float) -> tuple[Arm, Array]:
+    """Return the arm from its first to its last joint, and its target, in units of `length`."""
     first, last = inverse(arm.gaps[0]), inverse(arm.gaps[-1])
     gaps, target = arm.gaps.copy(), first @ T @ last
     gaps[0], gaps[-1] = np.eye(4), np.eye(4)
@@ -231,10 +252,11 @@ def _inner(arm: Arm, T: Array, length: float) -> tuple[Arm, Array]:
     return Arm(arm.names, arm.prismatic, gaps), target
 
 
-def _rows(arm: Arm, target: Array, q: Complex) -> tuple[Complex, Complex, Array, Array]:
+def _pose_equations(arm: Arm, target: Array, q: Complex) -> tuple[Complex, Complex, Array, Array]:
     """Return equations (m, 6), derivatives (m, 6, 6), norms of twists (m, 6), and |X - 1| (m,).
 
-    The reference is the middle of the arm, where complex angles increase the twists least.
+    X is the pose error at q (m, 6). The reference is the middle of the arm, where complex angles
+    increase the twists least.
     """
     moved = [motion(q[:, k], bool(prismatic)) for k, prismatic in enumerate(arm.prismatic)]
     half = moved[0] @ arm.gaps[1] @ moved[1] @ arm.gaps[2] @ moved[2] @ arm.gaps[3]
@@ -256,7 +278,7 @@ def _rows(arm: Arm, target: Array, q: Complex) -> tuple[Complex, Complex, Array,
     slopes = np.concatenate([X @ twists[:3], twists[3:] @ X])
     norms = np.linalg.norm(twists, axis=(2, 3)).T
     gap = np.linalg.norm(X - np.eye(4), axis=(1, 2))
-    return _six(X), np.moveaxis(_six(slopes), 0, -1), norms, gap
+    return _position_and_skew(X), np.moveaxis(_position_and_skew(slopes), 0, -1), norms, gap
 
 
 def _skew(axis: Complex) -> Complex:
@@ -266,8 +288,8 @@ def _skew(axis: Complex) -> Complex:
     return np.moveaxis(np.array([[o, -z, y], [z, o, -x], [-y, x, o]]), (0, 1), (-2, -1))
 
 
-def _six(X: Complex) -> Complex:
-    """Return the positions of matrices (..., 4, 4) and the skew parts of rotations, (..., 6)."""
+def _position_and_skew(X: Complex) -> Complex:
+    """Return positions and skew parts of rotations (..., 6) of matrices X (..., 4, 4)."""
     R = X[..., :3, :3]
     turned = [R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]]
     return np.concatenate([X[..., :3, 3], 0.5 * np.stack(turned, axis=-1)], axis=-1)
@@ -295,7 +317,13 @@ class CertifiedArm:
 
 
 def certified_arm(arm: General) -> CertifiedArm:
-    """Return the prepared arm with the largest number of certified roots at random poses."""
+    """Return a prepared arm with its number of complex configurations.
+
+    It is the largest number of certified roots at some random poses.
+
+    Args:
+        arm: arm prepared for the general method.
+    """
     q = random_configurations(arm.arm, np.eye(4), _POSES, _SEED)
     return CertifiedArm(
         arm,
@@ -307,7 +335,12 @@ def certified_arm(arm: General) -> CertifiedArm:
 
 
 def certified_configurations(arm: CertifiedArm, T: Array) -> Roots:
-    """Return the real configurations (m, 6) of a pose T (4, 4) [m], with their certificate."""
+    """Return the real configurations that reach a pose, with a certificate of completeness.
+
+    Args:
+        arm: prepared arm with its number of complex configurations.
+        T: (4, 4) target pose [m].
+    """
     own, found = arm.general.arm, general(arm.general, T)
     candidates = np.concatenate([complex_candidates(arm.general.prepared, T), found])
     roots = certified_roots(own, T, candidates)

@@ -71,7 +71,7 @@ _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
 
 
 class _ArmStruct(ctypes.Structure):
-    """C structure `arm` of arm.h, with the numbers of an `Arm`."""
+    """C structure `arm` of arm.h: joints and constant transforms of an `Arm`."""
 
     _fields_ = (
         ("n", ctypes.c_int),
@@ -82,7 +82,10 @@ class _ArmStruct(ctypes.Structure):
 
 
 def core_of(arm: Arm) -> ctypes.CDLL:
-    """Return the run-time library for an arm.
+    """Return the run-time library, after a check of the number of joints of the arm.
+
+    Args:
+        arm: arm of at most 64 joints.
 
     Raises:
         ModelError: the arm has too many joints.
@@ -97,12 +100,16 @@ def core_of(arm: Arm) -> ctypes.CDLL:
 
 
 def path_of(library: ctypes.CDLL) -> Path:
-    """Return the path of the file of a loaded library."""
+    """Return the path of the file from which a library was loaded.
+
+    Args:
+        library: library loaded by ctypes.
+    """
     return Path(library._name)
 
 
 def _files(sources: tuple[str, ...]) -> dict[str, str]:
-    """Return the C files and headers of `_PAIRS` and other C files, as text by name."""
+    """Return the texts of the C files `sources` and of all files that they need, by name."""
     return core_files([*(name + end for name in _PAIRS for end in (".c", ".h")), *sources])
 
 
@@ -117,7 +124,11 @@ def core() -> ctypes.CDLL:
 
 
 def library_at(path: str) -> ctypes.CDLL:
-    """Return the run-time library in a file, with the signatures of its arm functions."""
+    """Load the run-time library from a file and set the signatures of its arm functions.
+
+    Args:
+        path: path of the shared library.
+    """
     library = ctypes.CDLL(path)
     for name, (result, arguments) in _SIGNATURES.items():
         function = getattr(library, name)
@@ -126,7 +137,7 @@ def library_at(path: str) -> ctypes.CDLL:
 
 
 def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
-    """Return polished configurations (m, n) and their residuals (m,) [m or 1].
+    """Return configurations refined by Newton's method (m, n), and their residuals (m,) [m or 1].
 
     Args:
         library: run-time library.
@@ -134,59 +145,108 @@ def polished_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Arr
         T: (4, 4) target pose of all, or (m, 4, 4) of each.
         q: (m, n) configurations [rad or m].
     """
-    own, residual, _ = _rooms(len(q), arm.size)
+    own, residual, _ = _output_arrays(len(q), arm.size)
     own[:] = q
     target = _targets(T, len(q))
-    stride, handed = 16 if target.ndim == 3 else 0, handed_of(arm)
-    library.mbs_polish(handed.address, _at(target), stride, len(q), _at(own), _at(residual))
+    stride, c_arm = 16 if target.ndim == 3 else 0, c_arm_of(arm)
+    library.mbs_polish(
+        c_arm.address, _address(target), stride, len(q), _address(own), _address(residual)
+    )
     return own, residual
 
 
 def found_by(
     library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int
 ) -> tuple[Array, Hits]:
-    """Return solutions (m, n) of multi-start Levenberg-Marquardt, and starts for each (m,)."""
-    target = _wanted(T, 4, 4)
-    q, residual, hits = _rooms(starts, arm.size)
-    handed = handed_of(arm)
+    """Return solutions of multi-start Levenberg-Marquardt from random configurations.
+
+    Args:
+        library: run-time library.
+        arm: arm of the configurations.
+        T: (4, 4) target pose [m].
+        starts: number of random configurations.
+        seed: seed of the random numbers.
+
+    Returns:
+        (m, n) distinct solutions [rad or m], and (m,) number of starts that converged to each.
+    """
+    target = _c_array(T, 4, 4)
+    q, residual, hits = _output_arrays(starts, arm.size)
+    c_arm = c_arm_of(arm)
     count = library.mbs_search(
-        handed.address, _at(target), starts, seed, _at(q), _at(residual), hits.ctypes.data
+        c_arm.address,
+        _address(target),
+        starts,
+        seed,
+        _address(q),
+        _address(residual),
+        hits.ctypes.data,
     )
     return q[:count].copy(), hits[:count].copy()
 
 
 def merged_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Hits]:
-    """Return the distinct configurations of q (m, n), and the number of copies of each."""
-    target = _wanted(T, 4, 4)
-    own, residual, hits = _rooms(len(q), arm.size)
+    """Return the distinct configurations among solutions of one pose, and the copies of each (m,).
+
+    Args:
+        library: run-time library.
+        arm: arm of the configurations.
+        T: (4, 4) target pose [m].
+        q: (m, n) solutions [rad or m].
+    """
+    target = _c_array(T, 4, 4)
+    own, residual, hits = _output_arrays(len(q), arm.size)
     own[:] = q
-    handed = handed_of(arm)
+    c_arm = c_arm_of(arm)
     count = library.mbs_merge(
-        handed.address, _at(target), len(q), _at(own), _at(residual), hits.ctypes.data
+        c_arm.address,
+        _address(target),
+        len(q),
+        _address(own),
+        _address(residual),
+        hits.ctypes.data,
     )
     return own[:count].copy(), hits[:count].copy()
 
 
 def nearest_by(library: ctypes.CDLL, arm: Arm, T: Array, starts: int, seed: int) -> Array:
-    """Return the configuration (n,) whose pose is nearest to T, from random starts."""
-    target, q = _wanted(T, 4, 4), np.empty(arm.size)
-    handed = handed_of(arm)
-    library.mbs_nearest(handed.address, _at(target), starts, seed, _at(q))
+    """Return the configuration (n,) whose pose is nearest to a target, from random starts.
+
+    Args:
+        library: run-time library.
+        arm: arm of the configurations.
+        T: (4, 4) target pose [m].
+        starts: number of random configurations.
+        seed: seed of the random numbers.
+    """
+    target, q = _c_array(T, 4, 4), np.empty(arm.size)
+    c_arm = c_arm_of(arm)
+    library.mbs_nearest(c_arm.address, _address(target), starts, seed, _address(q))
     return q
 
 
 def singular_by(library: ctypes.CDLL, arm: Arm, q: Array, bound: float) -> NDArray[np.bool_]:
-    """Return whether each configuration of q (m, n) has a singular value below a bound (m,)."""
-    own, singular = _wanted(q, len(q), arm.size), np.empty(len(q), dtype=bool)
-    handed = handed_of(arm)
-    library.mbs_singular(handed.address, bound, len(q), _at(own), singular.ctypes.data)
+    """Return a mask (m,) of the configurations whose Jacobian has a singular value below a bound.
+
+    Args:
+        library: run-time library.
+        arm: arm of the configurations.
+        q: (m, n) configurations [rad or m].
+        bound: bound of the singular value, with lengths in arm lengths.
+    """
+    own, singular = _c_array(q, len(q), arm.size), np.empty(len(q), dtype=bool)
+    c_arm = c_arm_of(arm)
+    library.mbs_singular(c_arm.address, bound, len(q), _address(own), singular.ctypes.data)
     return singular
 
 
 def corrected_by(
     library: ctypes.CDLL, arm: Arm, T: Array, x: Array, held: Array, value: Array, iterations: int
 ) -> Array:
-    """Return solutions (m, n) near x = q / unit (m, n), with the constraint held . x = value.
+    """Return solutions (m, n) near first guesses that also satisfy a linear constraint.
+
+    Unknowns are x = q / unit, with the unit of each joint: 1 rad or the length of the arm. The
+    constraint is held . x = value.
 
     Args:
         library: run-time library.
@@ -200,31 +260,58 @@ def corrected_by(
     m, n = len(x), arm.size
     own = np.array(np.broadcast_to(x, (m, n)), dtype=float, order="C")
     target = _targets(T, m)
-    stride, handed = 16 if target.ndim == 3 else 0, handed_of(arm)
-    rows, right = _wanted(held, m, n), _wanted(value, m)
+    stride, c_arm = 16 if target.ndim == 3 else 0, c_arm_of(arm)
+    rows, right = _c_array(held, m, n), _c_array(value, m)
     library.mbs_correct(
-        handed.address, _at(target), stride, m, _at(rows), _at(right), iterations, _at(own)
+        c_arm.address,
+        _address(target),
+        stride,
+        m,
+        _address(rows),
+        _address(right),
+        iterations,
+        _address(own),
     )
     return own
 
 
 def residual_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> Array:
-    """Return the largest element of |pose(q) - T| (m,), T (4, 4) or (m, 4, 4), at q (m, n)."""
-    own, target, residual = _wanted(q, *q.shape), _targets(T, len(q)), np.empty(len(q))
-    handed = handed_of(arm)
+    """Return the largest element of |pose(q) - T| (m,) [m or 1].
+
+    Args:
+        library: run-time library.
+        arm: arm of the configurations.
+        T: (4, 4) target pose of all, or (m, 4, 4) of each.
+        q: (m, n) configurations [rad or m].
+    """
+    own, target, residual = _c_array(q, *q.shape), _targets(T, len(q)), np.empty(len(q))
+    c_arm = c_arm_of(arm)
     stride = 16 if target.ndim == 3 else 0
-    library.mbs_residual(handed.address, _at(target), stride, len(q), _at(own), _at(residual))
+    library.mbs_residual(
+        c_arm.address, _address(target), stride, len(q), _address(own), _address(residual)
+    )
     return residual
 
 
 def examined_by(library: ctypes.CDLL, arm: Arm, T: Array, q: Array) -> tuple[Array, Array]:
-    """Return gaps to T (m, 6) and Jacobians (m, 6, n) at q (m, n), lengths in arm lengths."""
+    """Return displacements (m, 6) to target poses and Jacobians (m, 6, n), lengths in arm lengths.
+
+    A displacement is a translation and a rotation vector, as of `gap_to`.
+
+    Args:
+        library: run-time library.
+        arm: arm of the configurations.
+        T: (4, 4) target pose of all, or (m, 4, 4) of each.
+        q: (m, n) configurations [rad or m].
+    """
     m, n = q.shape
-    own, target = _wanted(q, m, n), _targets(T, m)
+    own, target = _c_array(q, m, n), _targets(T, m)
     gap, J = np.empty((m, 6)), np.empty((m, n, 6))
-    handed = handed_of(arm)
+    c_arm = c_arm_of(arm)
     stride = 16 if target.ndim == 3 else 0
-    library.mbs_examine(handed.address, _at(target), stride, m, _at(own), _at(gap), _at(J))
+    library.mbs_examine(
+        c_arm.address, _address(target), stride, m, _address(own), _address(gap), _address(J)
+    )
     return gap, np.swapaxes(J, 1, 2)
 
 
@@ -241,9 +328,11 @@ def on_sphere_by(
         radius: distance from the centre.
         x: (m, n) first guesses.
     """
-    own, middle = np.array(x, dtype=float, order="C"), _wanted(centre, arm.size)
-    target, handed = _wanted(T, 4, 4), handed_of(arm)
-    library.mbs_reach_sphere(handed.address, _at(target), _at(middle), radius, len(own), _at(own))
+    own, middle = np.array(x, dtype=float, order="C"), _c_array(centre, arm.size)
+    target, c_arm = _c_array(T, 4, 4), c_arm_of(arm)
+    library.mbs_reach_sphere(
+        c_arm.address, _address(target), _address(middle), radius, len(own), _address(own)
+    )
     return own
 
 
@@ -259,7 +348,7 @@ class _ReductionStruct(ctypes.Structure):
 def reduced_by(
     library: ctypes.CDLL, arm: Arm, T: Array, parts: tuple[Array, Array, Array, Array], h: Array
 ) -> tuple[Array, Array, bool]:
-    """Return X (m, n) and g (m, 6 - rank) for h (m, corank), and whether all iterations converged.
+    """Return points of the Lyapunov-Schmidt reduction at a singular configuration.
 
     Args:
         library: run-time library.
@@ -267,15 +356,25 @@ def reduced_by(
         T: (4, 4) target pose.
         parts: reduction at a singular configuration: centre (n,), solved directions of equations
             (rank, 6), remaining directions (6 - rank, 6), null directions of x (corank, n).
-        h: coordinates along the null directions.
+        h: (m, corank) coordinates along the null directions.
+
+    Returns:
+        Configurations x = q / unit (m, n) that satisfy the solved equations, values (m, 6 - rank)
+        of the remaining equations, and whether all iterations converged.
     """
     count, corank = h.shape
     held = [np.ascontiguousarray(part, dtype=float) for part in parts]
-    own = _ReductionStruct(corank, *map(_at, held))
+    own = _ReductionStruct(corank, *map(_address, held))
     x, g = np.empty((count, arm.size)), np.empty((count, len(held[2])))
-    target, given, handed = _wanted(T, 4, 4), _wanted(h, count, corank), handed_of(arm)
+    target, given, c_arm = _c_array(T, 4, 4), _c_array(h, count, corank), c_arm_of(arm)
     found = library.mbs_reduced(
-        handed.address, _at(target), ctypes.addressof(own), count, _at(given), _at(x), _at(g)
+        c_arm.address,
+        _address(target),
+        ctypes.addressof(own),
+        count,
+        _address(given),
+        _address(x),
+        _address(g),
     )
     return x, g, bool(found)
 
@@ -302,31 +401,36 @@ def walked_by(
         most: maximum number of points.
         sided: whether the path must stay on one of two curves that pass close by each other.
     """
-    points, target = np.empty((most + 1, arm.size)), _wanted(T, 4, 4)
+    points, target = np.empty((most + 1, arm.size)), _c_array(T, 4, 4)
     points[0] = start
-    along, closed, handed = _wanted(tangent, arm.size), ctypes.c_int(0), handed_of(arm)
+    along, closed, c_arm = _c_array(tangent, arm.size), ctypes.c_int(0), c_arm_of(arm)
     count = library.mbs_walk(
-        handed.address,
-        _at(target),
-        _at(along),
+        c_arm.address,
+        _address(target),
+        _address(along),
         limit,
         most,
         sided,
-        _at(points),
+        _address(points),
         ctypes.addressof(closed),
     )
     return points[:count].copy(), bool(closed.value)
 
 
 def rounded_by(library: ctypes.CDLL, T: Array) -> Array | None:
-    """Return the rigid transform nearest to T (4, 4); None if T is not rigid within 1e-6."""
+    """Return the rigid transform (4, 4) nearest to a matrix; None if it is not rigid within 1e-6.
+
+    Args:
+        library: run-time library.
+        T: (4, 4) matrix.
+    """
     own = np.array(T, dtype=float, order="C")
-    return own if library.mbs_round(_at(own)) else None
+    return own if library.mbs_round(_address(own)) else None
 
 
 def settled_by(
     library: ctypes.CDLL,
-    handed: CArm,
+    c_arm: CArm,
     T: Array,
     every: tuple[Array, ...],
     bounds: tuple[float, float],
@@ -335,7 +439,7 @@ def settled_by(
 
     Args:
         library: run-time library.
-        handed: arm as a C structure.
+        c_arm: arm as a C structure.
         T: (4, 4) rigid transform [m].
         every: q (branches, n) and residual (branches,), both overwritten; real and regular
             (branches,).
@@ -348,14 +452,14 @@ def settled_by(
     """
     q, residual = every[:2]
     number, count = np.empty(len(residual)), ctypes.c_longlong(0)
-    target = _wanted(T, 4, 4)
+    target = _c_array(T, 4, 4)
     doubtful = library.mbs_settle(
-        handed.address,
-        _at(target),
+        c_arm.address,
+        _address(target),
         len(residual),
-        *map(_at, every),
+        *map(_address, every),
         *bounds,
-        _at(number),
+        _address(number),
         ctypes.addressof(count),
     )
     m = count.value
@@ -363,7 +467,11 @@ def settled_by(
 
 
 class CArm:
-    """C structure of an arm, and the arrays that it points to."""
+    """C structure of an arm, and the arrays that it points to.
+
+    Attributes:
+        address: memory address of the structure.
+    """
 
     def __init__(self, arm: Arm) -> None:
         self.gaps = np.ascontiguousarray(arm.gaps, dtype=float)
@@ -373,30 +481,37 @@ class CArm:
 
 
 @functools.lru_cache(maxsize=256)
-def handed_of(arm: Arm) -> CArm:
-    """Return the C structure of an arm, cached, because an arm is immutable."""
+def c_arm_of(arm: Arm) -> CArm:
+    """Return the C structure of an arm, cached, because an arm is immutable.
+
+    Args:
+        arm: numeric arm.
+    """
     return CArm(arm)
 
 
-def _wanted(T: Array, *shape: int) -> Array:
-    """Return a C-contiguous double array of a shape; a wrong shape raises, to protect C code."""
+def _c_array(T: Array, *shape: int) -> Array:
+    """Return T as a C-contiguous array of doubles of this shape, for a C function.
+
+    Raises ValueError if T cannot be broadcast to the shape, since C code does not check it.
+    """
     if type(T) is np.ndarray and T.shape == shape and T.dtype == np.float64:
         return T if T.flags.c_contiguous else np.ascontiguousarray(T)
     return np.ascontiguousarray(np.broadcast_to(np.asarray(T, dtype=float), shape))
 
 
 def _targets(T: Array, count: int) -> Array:
-    """Return one target pose for all configurations, or one for each."""
-    return _wanted(T, *((4, 4) if np.ndim(T) == 2 else (count, 4, 4)))
+    """Return target poses as an array for C: (4, 4) for all configurations, or (count, 4, 4)."""
+    return _c_array(T, *((4, 4) if np.ndim(T) == 2 else (count, 4, 4)))
 
 
-def _rooms(count: int, n: int) -> tuple[Array, Array, Hits]:
-    """Return empty buffers for `count` solutions of n joints, their residuals and hits."""
+def _output_arrays(count: int, n: int) -> tuple[Array, Array, Hits]:
+    """Return uninitialised arrays for `count` configurations of n joints, residuals and hits."""
     return np.empty((count, n)), np.empty(count), np.empty(count, dtype=np.int64)
 
 
-def _at(array: Array) -> int:
-    """Return the memory address of an array."""
+def _address(array: Array) -> int:
+    """Return the memory address of the data of an array."""
     return int(array.ctypes.data)
 
 
@@ -412,12 +527,14 @@ _int, _double = ctypes.c_int, ctypes.c_double
 
 
 class _LoopStruct(ctypes.Structure):
+    """C structure `roth_loop` of raghavan_roth.h: an arm prepared for the general method."""
+
     _fields_ = (
         ("order", _int * 6),
         ("sign", _int),
         ("slides", _int * 6),
         ("offsets", _double * 6),
-        ("ways", _double * 16 * 6),
+        ("transforms", _double * 16 * 6),
         ("place", _int),
         ("after", _double * 16),
         ("length", _double),
@@ -432,17 +549,22 @@ class _LoopStruct(ctypes.Structure):
     )
 
 
-class HandedLoop:
-    """C structure of a prepared arm, and the arrays that it points to."""
+class CLoop:
+    """C structure of an arm prepared for the general method, and the arrays that it points to.
+
+    Attributes:
+        address: memory address of the structure.
+        next: structure of an alternative elimination, or None.
+    """
 
     def __init__(self, arm: Arm, prepared: Prepared) -> None:
         loop, pencil = prepared.arrangement, prepared.pencil
         elimination = pencil.elimination
-        self.arm = handed_of(arm)
-        self.next: HandedLoop | None = None
+        self.arm = c_arm_of(arm)
+        self.next: CLoop | None = None
         if prepared.others:
             first, *others = prepared.others
-            self.next = HandedLoop(arm, replace(first, others=tuple(others)))
+            self.next = CLoop(arm, replace(first, others=tuple(others)))
         self.mix = np.ascontiguousarray(pencil.mix, dtype=float)
         square = self.mix.shape[0] == self.mix.shape[1]
         parts = ("first", "second", "third", "fourth", "fifth")
@@ -452,7 +574,7 @@ class HandedLoop:
             loop.sign,
             (_int * 6)(*map(int, loop.prismatic)),
             (_double * 6)(*loop.offsets.tolist()),
-            (_double * 16 * 6)(*((_double * 16)(*way.ravel().tolist()) for way in loop.ways)),
+            (_double * 16 * 6)(*((_double * 16)(*way.ravel().tolist()) for way in loop.transforms)),
             loop.index,
             (_double * 16)(*loop.after.ravel().tolist()),
             loop.length,
@@ -468,8 +590,13 @@ class HandedLoop:
         self.address: int = ctypes.addressof(self.loop)
 
 
-def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbers, Array]:
-    """Return the solutions of the general method for poses T (N, 4, 4).
+def solved_by(library: ctypes.CDLL, c_loop: CLoop, T: Array) -> tuple[Numbers, Array]:
+    """Return the solutions of the general method (Raghavan and Roth) for many poses.
+
+    Args:
+        library: run-time library.
+        c_loop: arm prepared for the general method.
+        T: (N, 4, 4) target poses [m].
 
     Returns:
         (m,) indices of the poses, ascending, and (m, 6) configurations for them.
@@ -481,8 +608,8 @@ def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbe
     found = list[tuple[Numbers, Array]]()
     while start < len(target) or not found:
         count = library.mbs_general(
-            handed.arm.address,
-            handed.address,
+            c_loop.arm.address,
+            c_loop.address,
             target[start:].ctypes.data,
             len(target) - start,
             room,
@@ -499,10 +626,16 @@ def solved_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> tuple[Numbe
     return np.concatenate(numbers), np.concatenate(configurations)
 
 
-def candidates_by(library: ctypes.CDLL, handed: HandedLoop, T: Array) -> Array:
-    """Return configurations (m, 6) that may reach a pose (4, 4), not polished and not checked."""
-    target, q = _wanted(T, 4, 4), np.empty((_CANDIDATES, 6))
-    return q[: library.mbs_candidates(handed.address, _at(target), _at(q))].copy()
+def candidates_by(library: ctypes.CDLL, c_loop: CLoop, T: Array) -> Array:
+    """Return configurations (m, 6) that may reach a pose, neither polished nor checked.
+
+    Args:
+        library: run-time library.
+        c_loop: arm prepared for the general method.
+        T: (4, 4) target pose [m].
+    """
+    target, q = _c_array(T, 4, 4), np.empty((_CANDIDATES, 6))
+    return q[: library.mbs_candidates(c_loop.address, _address(target), _address(q))].copy()
 
 
 # General method of an arm as a Function with C code that contains the numbers of the arm.
@@ -539,7 +672,7 @@ EXPORT int jac_FUNCTION(const double **arg, double **res, long long *iw, double 
 
 
 class SolverStruct(ctypes.Structure):
-    """C structure `pose_solver` of pose.h."""
+    """C structure `pose_solver` of pose.h: inverse geometry of an arm in generated C code."""
 
     _fields_ = (
         *((name, ctypes.c_void_p) for name in ("robot", "loop", "evaluate", "checkout", "release")),
@@ -553,21 +686,25 @@ class SolverStruct(ctypes.Structure):
 
 
 def general_function(
-    name: str, handed: HandedLoop, indices: Sequence[int], others: Array, nearly: float
+    name: str, c_loop: CLoop, indices: Sequence[int], others: Array, nearly: float
 ) -> Function:
-    """Return ``name(T) -> q, valid, count, certain`` with C code, see `pose_all` of pose.h.
+    """Return the Function ``name(T) -> q, valid, count, certain`` of the general method, in C.
 
     Args:
         name: prefix of the name of the function.
-        handed: arm prepared for the general method.
+        c_loop: arm prepared for the general method.
         indices: (6,) indices of the joints of the arm among the coordinates.
         others: (nq,) positions of all coordinates [rad or m]. Joints of the arm are ignored.
         nearly: singular value of the Jacobian below which configurations may be missing.
 
     Raises:
         CompilerError: no C compiler was found.
+
+    Returns:
+        Function of the target pose T (4, 4): configurations q (nq, 16), mask valid (16, 1), number
+        count of configurations, and certain, which is 0 if configurations may be missing.
     """
-    nq, arm = len(others), handed.arm
+    nq, arm = len(others), c_loop.arm
     solver = SolverStruct(nearly=nearly, nq=nq)
     of_arm = {"gaps": "FUNCTION_gaps", "slides": "FUNCTION_prismatic"}
     of_solver = {"robot": "&FUNCTION_arm", "loop": "&FUNCTION_loop0"}
@@ -576,7 +713,7 @@ def general_function(
         gaps=_initializer(arm.gaps.ravel()),
         slides=_initializer(arm.slides),
         arm=_initializer(arm.arm, of_arm),
-        loops=_loop_tables(handed),
+        loops=_loop_tables(c_loop),
         indices=_initializer(indices),
         others=_initializer(others),
         solver=_initializer(solver, of_solver),
@@ -598,22 +735,25 @@ def general_function(
     return handwritten(signature, jacobian, own, _files(_SOURCES), work)
 
 
-def _loop_tables(handed: HandedLoop, number: int = 0) -> str:
-    """Return C text of a loop of an arm, after the text of its alternative loops."""
+def _loop_tables(c_loop: CLoop, number: int = 0) -> str:
+    """Return the C text of a prepared loop with index `number`, after those of its alternatives."""
     owned, text = dict[str, str](), ""
-    if handed.next is not None:
-        text += _loop_tables(handed.next, number + 1)
+    if c_loop.next is not None:
+        text += _loop_tables(c_loop.next, number + 1)
         owned["next"] = f"&FUNCTION_loop{number + 1}"
-    if handed.loop.mix:
-        mix = _initializer(handed.mix.ravel())
+    if c_loop.loop.mix:
+        mix = _initializer(c_loop.mix.ravel())
         text += f"static const double FUNCTION_mix{number}[] = {mix};\n"
         owned["mix"] = f"FUNCTION_mix{number}"
-    loop = _initializer(handed.loop, owned)
+    loop = _initializer(c_loop.loop, owned)
     return f"{text}static const roth_loop FUNCTION_loop{number} = {loop};\n"
 
 
 def _initializer(value: Any, owned: Mapping[str, str] = MappingProxyType({})) -> str:
-    """Return the C initializer of numbers or of a structure; its pointers are names or null."""
+    """Return the C initializer of a number, an array or a structure.
+
+    `owned` maps the names of pointers of the structure to C names; other pointers are null.
+    """
     if isinstance(value, ctypes.Structure):
         pairs = [(field[0], field[1]) for field in value._fields_]
         texts = (

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 import mbs.closed_forms.arm_core as core
 from mbs.closed_forms.arm import Arm, Array, gap_to
-from mbs.closed_forms.arm_core import HandedLoop, Numbers, solved_by
+from mbs.closed_forms.arm_core import CLoop, Numbers, solved_by
 from mbs.closed_forms.raghavan_roth.numbers import Prepared, prepare
 from mbs.errors import NoClosedForm
 
@@ -17,10 +17,15 @@ from mbs.errors import NoClosedForm
 
 
 def examine_arm(arm: Arm, T: Array, q: Array) -> tuple[Array, Array, Array]:
-    """Return costs (m,), gaps (m, 6) and Jacobians (m, 6, n) of configurations q (m, n).
+    """Return costs (m,), displacements to the target (m, 6) and Jacobians (m, 6, n).
 
-    Lengths are divided by the length of the arm. A gap is the displacement to the target pose T
-    (translation, rotation vector); the cost is its squared norm.
+    Lengths are divided by the length of the arm. A displacement is a translation and a rotation
+    vector, as of `gap_to`; the cost is its squared norm.
+
+    Args:
+        arm: arm of the configurations.
+        T: (4, 4) target pose [m].
+        q: (m, n) configurations [rad or m].
     """
     pose, J = arm.pose_and_jacobian(q)
     gap = gap_to(T, pose)
@@ -53,7 +58,12 @@ def merged(arm: Arm, T: Array, q: Array) -> tuple[Array, Numbers]:
 
 
 def wrapped(arm: Arm, q: Array) -> Array:
-    """Return configurations with all angles in (-pi, pi]."""
+    """Return configurations with all angles in (-pi, pi].
+
+    Args:
+        arm: arm of the configurations.
+        q: (..., n) configurations [rad or m].
+    """
     turns = np.pi - np.mod(np.pi - q, 2 * np.pi)
     within = (q > -np.pi) & (q <= np.pi)
     return np.where(arm.prismatic | within, q, turns)
@@ -85,12 +95,26 @@ def search(arm: Arm, T: Array, starts: int = 300, seed: int = SEED) -> Array:
 def counted_search(
     arm: Arm, T: Array, starts: int = 300, seed: int = SEED
 ) -> tuple[Array, Numbers]:
-    """Return the result of `search`, and the number of starts that converged to each solution."""
+    """Return the solutions of `search`, and the number of starts that converged to each of them.
+
+    Args:
+        arm: arm whose configurations are searched.
+        T: (4, 4) target pose.
+        starts: number of random configurations.
+        seed: seed of the random numbers.
+    """
     return core.found_by(core.core_of(arm), arm, T, starts, seed)
 
 
 def random_configurations(arm: Arm, T: Array, count: int, seed: int) -> Array:
-    """Return random configurations (count, n): angles, and displacements within reach of T."""
+    """Return random configurations (count, n): angles, and displacements within reach of a pose.
+
+    Args:
+        arm: arm of the configurations.
+        T: (4, 4) target pose [m].
+        count: number of configurations.
+        seed: seed of the random numbers.
+    """
     indices = np.arange(1, count * arm.size + 1, dtype=np.uint64)
     chance = _split_mix(np.array([seed % 2**64], dtype=np.uint64), indices).reshape(count, arm.size)
     reach = arm.length + np.linalg.norm(T[:3, 3])
@@ -98,7 +122,10 @@ def random_configurations(arm: Arm, T: Array, count: int, seed: int) -> Array:
 
 
 def _split_mix(seed: NDArray[np.uint64], indices: NDArray[np.uint64]) -> Array:
-    """Return random numbers in [0, 1). Source: Steele, Lea and Flood 2014."""
+    """Return a random number in [0, 1) for each index, by the SplitMix64 generator with this seed.
+
+    Source: Steele, Lea and Flood 2014.
+    """
     z = seed + indices * np.uint64(0x9E3779B97F4A7C15)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -165,7 +192,7 @@ def nearest(arm: Arm, T: Array) -> Nearest:
 
 
 def _measure(arm: Arm, T: Array, q: Array) -> Nearest:
-    """Return q (n,) with its pose and the distance [m] and angle [rad] of the pose to T (4, 4)."""
+    """Return q (n,) with its pose, and the distance [m] and angle [rad] of the pose to T."""
     pose = arm.pose(q)
     gap = gap_to(T, pose)
     return Nearest(q, float(np.linalg.norm(gap[:3])), float(np.linalg.norm(gap[3:])), pose)
@@ -181,12 +208,12 @@ class General:
     Attributes:
         arm: arm of six joints.
         prepared: loop and matrices that the method selected for the arm.
-        handed: arm and selection as structures for the compiled library.
+        c_loop: arm and selection as structures for the compiled library.
     """
 
     arm: Arm
     prepared: Prepared
-    handed: HandedLoop
+    c_loop: CLoop
 
 
 def general_of(arm: Arm) -> General:
@@ -195,6 +222,9 @@ def general_of(arm: Arm) -> General:
     Raises:
         ModelError: the arm does not have six joints, or has no revolute joint.
         NoClosedForm: the method is singular for this arm.
+
+    Args:
+        arm: arm of six joints.
     """
     prepared = prepare(arm)
     if not prepared.regular:
@@ -203,7 +233,7 @@ def general_of(arm: Arm) -> General:
             f" singular at every configuration (its regularity is {prepared.regularity:.0e}); use"
             " method='search'"
         )
-    return General(arm, prepared, HandedLoop(arm, prepared))
+    return General(arm, prepared, CLoop(arm, prepared))
 
 
 def general(arm: General, T: Array) -> Array:
@@ -231,4 +261,4 @@ def general_many(arm: General, T: Array) -> tuple[Numbers, Array]:
     Returns:
         (m,) indices of the poses, ascending, and (m, 6) configurations for them.
     """
-    return solved_by(core.core_of(arm.arm), arm.handed, T)
+    return solved_by(core.core_of(arm.arm), arm.c_loop, T)

@@ -29,12 +29,25 @@ class Centre:
     after: SX
 
     def joints(self, size: int) -> list[int]:
-        """Return the indices of its joints in a loop of `size` joints."""
+        """Return the indices of its joints in a loop of `size` joints.
+
+        Args:
+            size: number of joints of the loop.
+        """
         return [(self.first + k) % size for k in range(self.count)]
 
 
 def centres(ring: Ring, q: SX, p: SX) -> list[Centre]:
-    """Return centres: spherical joints, and 2 or 3 neighbouring revolute joints that intersect."""
+    """Return the centres of a loop: points that consecutive joints keep fixed.
+
+    They are spherical joints, and two or three neighbouring revolute joints whose axes intersect in
+    one point for all positions.
+
+    Args:
+        ring: loop chain.
+        q: symbols of positions.
+        p: symbols of parameters.
+    """
     found = list[Centre]()
     for k, joint in enumerate(ring.joints):
         if joint.motion is Motion.SPHERICAL:
@@ -51,7 +64,13 @@ def centres(ring: Ring, q: SX, p: SX) -> list[Centre]:
 
 
 def with_spherical(ring: Ring, q: SX, p: SX) -> Ring:
-    """Return the loop with a spherical joint for every three intersecting revolute joints."""
+    """Return the loop with one spherical joint instead of every three intersecting revolute joints.
+
+    Args:
+        ring: loop chain.
+        q: symbols of positions.
+        p: symbols of parameters.
+    """
     for centre in centres(ring, q, p):
         if centre.count == 3 and len(ring.joints) > 3:
             return with_spherical(merge_centre(ring, centre), q, p)
@@ -59,7 +78,12 @@ def with_spherical(ring: Ring, q: SX, p: SX) -> Ring:
 
 
 def merge_centre(ring: Ring, centre: Centre) -> Ring:
-    """Return the loop that starts with a centre, as one spherical joint."""
+    """Return the loop with the joints of a centre as one spherical joint, which is its first joint.
+
+    Args:
+        ring: loop chain.
+        centre: centre of the loop.
+    """
     begun = ring.rotated(centre.first)
     joints, gaps = begun.joints[centre.count :], begun.gaps[centre.count :]
     name = ", ".join(joint.name for joint in begun.joints[: centre.count])
@@ -72,12 +96,23 @@ def merge_centre(ring: Ring, centre: Centre) -> Ring:
 
 
 def gap_pose(ring: Ring, k: int) -> Pose:
-    """Return the known transform before joint k, counted around the loop."""
+    """Return the known transform before joint k of a loop.
+
+    Args:
+        ring: loop chain.
+        k: index of the joint, counted cyclically around the loop.
+    """
     return ring.gaps[k % len(ring.gaps)].pose
 
 
 def are_revolute(ring: Ring, first: int, count: int) -> bool:
-    """Whether `count` different neighbouring joints from `first` on are revolute."""
+    """Whether some neighbouring joints of a loop are revolute and all different.
+
+    Args:
+        ring: loop chain.
+        first: index of the first joint.
+        count: number of joints.
+    """
     n = len(ring.joints)
     among = [ring.joints[(first + k) % n] for k in range(count)]
     return count <= n and all(joint.motion is Motion.REVOLUTE for joint in among)

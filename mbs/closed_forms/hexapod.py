@@ -37,8 +37,8 @@ _SIZE = 8
 _ROWS = LEGS + 1
 
 
-def _left(a: Complex) -> Complex:
-    """Return the matrices (..., 4, 4) of quaternion products a q for vectors a (..., 3)."""
+def _left_products(a: Complex) -> Complex:
+    """Return the matrices (..., 4, 4) of the quaternion products a q, for vectors a (..., 3)."""
     x, y, z = np.moveaxis(a, -1, 0)
     o = np.zeros_like(x)
     rows = np.array([[o, -x, -y, -z], [x, o, -z, y], [y, z, o, -x], [z, -y, x, o]])
@@ -46,12 +46,10 @@ def _left(a: Complex) -> Complex:
     return product
 
 
-def _right(b: Complex) -> Complex:
+def _right_products(b: Complex) -> Complex:
     """Return the matrices (..., 4, 4) of quaternion products q b for vectors b (..., 3)."""
-    x, y, z = np.moveaxis(b, -1, 0)
-    o = np.zeros_like(x)
-    rows = np.array([[o, -x, -y, -z], [x, o, z, -y], [y, -z, o, x], [z, y, -x, o]])
-    product: Complex = np.moveaxis(rows, (0, 1), (-2, -1))
+    signs = np.array([-1.0, 1.0, 1.0, 1.0])
+    product: Complex = signs[:, None] * signs * np.swapaxes(_left_products(b), -1, -2)
     return product
 
 
@@ -70,12 +68,15 @@ class PlatformLegs:
     c: Complex
 
     def forms(self) -> Complex:
-        """Return the symmetric matrices (7, 8, 8) of the equations; the last makes p a vector."""
+        """Return the symmetric matrices Q (7, 8, 8) of the equations x' Q x = 0 of x = (e, g).
+
+        The first six fix the leg lengths. The last one makes the scalar part of p zero.
+        """
         Q = np.zeros((_ROWS, _SIZE, _SIZE), dtype=np.complex128)
         Q[:LEGS, 4:, 4:] = np.eye(4)
-        N = _right(self.b) - _left(self.a)
+        N = _right_products(self.b) - _left_products(self.a)
         Q[:LEGS, 4:, :4], Q[:LEGS, :4, 4:] = N, np.swapaxes(N, 1, 2)
-        Q[:LEGS, :4, :4] = 2 * _left(self.a) @ _right(self.b)
+        Q[:LEGS, :4, :4] = 2 * _left_products(self.a) @ _right_products(self.b)
         Q[:LEGS, :4, :4] += self.c[:, None, None] * np.eye(4)
         Q[LEGS, 4:, :4] = Q[LEGS, :4, 4:] = np.eye(4)
         return Q
@@ -101,7 +102,7 @@ class Homotopy:
 
     @staticmethod
     def between(start: PlatformLegs, end: PlatformLegs) -> Homotopy:
-        """Return the path along a straight line of a, b and c."""
+        """Return the path along the straight line of a, b and c from `start` to `end`."""
         c = np.append(end.c - start.c, 0)
         first, last = start.forms(), end.forms()
         if np.array_equal(start.a, end.a) and np.array_equal(start.b, end.b):
@@ -111,7 +112,10 @@ class Homotopy:
         return Homotopy(np.array([first, last - first - bend, bend]), c)
 
     def slopes(self, x: Complex, t: Real) -> tuple[Complex, Complex]:
-        """Return derivatives of the rows by x, (r, 7, 8), and by t, (r, 7), at x (r, 8), t (r,)."""
+        """Return the derivatives of the equations by x, (r, 7, 8), and by t, (r, 7).
+
+        x (r, 8) are points and t (r,) path parameters from 0 to 1.
+        """
         Y = (x @ self.Q.reshape(-1, _SIZE).T).reshape(len(x), len(self.Q), _ROWS, _SIZE)
         J, e = Y[:, 0], x[:, :4]
         if len(self.Q) == 1:
@@ -122,30 +126,43 @@ class Homotopy:
         return 2 * (J + s * (Y[:, 1] + s * Y[:, 2])), rate
 
 
-def _square(J: Complex, patch: Complex) -> Complex:
-    """Append the row `patch` to J, which keeps the length of x constant to first order."""
+def _with_patch(J: Complex, patch: Complex) -> Complex:
+    """Append the row `patch` (r, 8) to J (r, 7, 8); it keeps the length of x constant."""
     return np.concatenate([J, patch.conj()[:, None, :]], axis=1)
 
 
-def _correction(path: Homotopy, x: Complex, t: Real, patch: Complex) -> tuple[Complex, Complex]:
-    """Return Newton's step and the tangent dx/dt of a homotopy path, both (r, 8)."""
+def _newton_step_and_tangent(
+    path: Homotopy, x: Complex, t: Real, patch: Complex
+) -> tuple[Complex, Complex]:
+    """Return Newton's step and the tangent dx/dt of a homotopy path at x, t, both (r, 8).
+
+    `patch` (r, 8) is normal to both.
+    """
     J, rate = path.slopes(x, t)
     sides = np.zeros((len(x), _SIZE, 2), dtype=np.complex128)
     sides[:, :_ROWS, 0], sides[:, :_ROWS, 1] = np.einsum("rij,rj->ri", J, x) / 2, rate
-    step = -solved(_square(J, patch), sides)
+    step = -solved(_with_patch(J, patch), sides)
     return step[..., 0], step[..., 1]
 
 
 def follow(path: Homotopy, x: Complex, tolerance: float = TOLERANCE) -> tuple[Complex, Real]:
-    """Return the ends (r, 8) of homotopy paths from roots x, and the reached t (r,).
+    """Track homotopy paths from their start at t = 0.
 
-    The ends have length one. t is 1 on a path that was followed completely.
+    Args:
+        path: homotopy.
+        x: (r, 8) roots at t = 0.
+        tolerance: largest relative error of a step.
+
+    Returns:
+        (r, 8) ends of length one, and (r,) reached t; 1 on a path that was followed completely.
     """
-    return homotopy.follow(functools.partial(_correction, path), x, _in_patch, tolerance)
+    return homotopy.follow(
+        functools.partial(_newton_step_and_tangent, path), x, _in_patch, tolerance
+    )
 
 
 def _in_patch(x: Complex, slope: Complex) -> tuple[Complex, Complex]:
-    """Return roots of length one, and slopes that keep this length to first order."""
+    """Return roots x (r, 8) scaled to length one, and slopes (r, 8) that keep it to first order."""
     size = np.linalg.norm(x, axis=1, keepdims=True)
     x, slope = x / size, slope / size
     return x, slope - np.sum(x.conj() * slope, axis=1, keepdims=True) * x
@@ -178,16 +195,21 @@ class PathEnds:
 
 
 def certify(legs: PlatformLegs, x: Complex, t: Real) -> PathEnds:
-    """Return the refined ends of paths that reached t, and which of them are certified.
+    """Return the ends of paths, refined by Newton's method, with certificates.
 
     Source: Blum, Cucker, Shub & Smale 1998, chapter 8; in floating point, with room for rounding.
+
+    Args:
+        legs: legs at the ends of the paths.
+        x: (r, 8) ends of the paths, changed in place.
+        t: (r,) reached path parameters; ends below 1 are not certified.
     """
     path = Homotopy.between(legs, legs)
     regular = t >= 1
     for _ in range(3):
         now = np.flatnonzero(regular)
         if len(now):
-            y = x[now] + _correction(path, x[now], t[now], x[now])[0]
+            y = x[now] + _newton_step_and_tangent(path, x[now], t[now], x[now])[0]
             regular[now] = np.all(np.isfinite(y), axis=1)
             with np.errstate(invalid="ignore"):
                 y /= np.linalg.norm(y, axis=1, keepdims=True)
@@ -196,7 +218,7 @@ def certify(legs: PlatformLegs, x: Complex, t: Real) -> PathEnds:
     y, zero = x[number], np.zeros(len(number))
     J, _ = path.slopes(y, zero)
     unit = np.broadcast_to(np.eye(_SIZE, dtype=np.complex128), (len(y), _SIZE, _SIZE))
-    W = solved(_square(J, y), unit)[..., :_ROWS]
+    W = solved(_with_patch(J, y), unit)[..., :_ROWS]
     newton = np.einsum("rij,rj->ri", W, np.einsum("rij,rj->ri", J, y) / 2)
     bend = np.linalg.norm(W @ path.Q[0].reshape(_ROWS, _SIZE * _SIZE), axis=(1, 2))
     certain = np.linalg.norm(newton, axis=1) * bend < _CERTAIN
@@ -227,7 +249,11 @@ DEGREE = 40
 
 
 def random_legs(rng: np.random.Generator) -> PlatformLegs:
-    """Return random complex legs about the origin, of about unit size."""
+    """Return six random complex legs whose ends have their means at the origin, of unit size.
+
+    Args:
+        rng: random number generator.
+    """
 
     def drawn(*shape: int) -> Complex:
         z = rng.normal(size=shape) + 1j * rng.normal(size=shape)
@@ -242,11 +268,11 @@ def _centred(legs: PlatformLegs) -> PlatformLegs:
 
 
 def monodromy(seed: int, most: int = 200) -> StartSystem:
-    """Return roots of random legs, by tracking known roots along closed paths of other legs.
+    """Return all roots of random legs, by tracking known roots along closed paths of other legs.
 
     Args:
         seed: seed of the random numbers.
-        most: maximum number of closed paths.
+        most: maximum number of closed paths. Fewer than 40 roots may be found.
     """
     rng = np.random.default_rng(seed)
     legs = random_legs(rng)
@@ -254,7 +280,7 @@ def monodromy(seed: int, most: int = 200) -> StartSystem:
         rng.normal(size=4) + 1j * rng.normal(size=4),
         rng.normal(size=3) + 1j * rng.normal(size=3),
     )
-    first = np.concatenate([e, _left(p) @ e])
+    first = np.concatenate([e, _left_products(p) @ e])
     # constants for which `first` is a root
     rest = np.einsum("i,kij,j->k", first, legs.forms()[:LEGS], first)
     legs = PlatformLegs(legs.a, legs.b, legs.c - rest / (e @ e))
@@ -274,14 +300,22 @@ def monodromy(seed: int, most: int = 200) -> StartSystem:
 
 
 def text_of(start: StartSystem) -> str:
-    """Return the values of a start as JSON text for a file."""
+    """Return a platform and its roots as JSON text for a file, which `stored_start` reads.
+
+    Args:
+        start: platform and roots.
+    """
     parts = {"a": start.legs.a, "b": start.legs.b, "c": start.legs.c, "x": start.x}
     return json.dumps({name: [z.real.tolist(), z.imag.tolist()] for name, z in parts.items()})
 
 
 @functools.cache
-def kept_start(number: int) -> StartSystem:
-    """Return one of the two starts that are stored next to this file."""
+def stored_start(number: int) -> StartSystem:
+    """Return a platform with its forty roots from a file of this package.
+
+    Args:
+        number: 0 or 1, the index of the file.
+    """
     file = resources.files("mbs.closed_forms") / "hexapod_starts" / f"{number}.json"
     told = json.loads(file.read_text(encoding="utf-8"))
     parts = {name: np.array(told[name][0]) + 1j * np.array(told[name][1]) for name in "abcx"}
@@ -290,12 +324,12 @@ def kept_start(number: int) -> StartSystem:
 
 
 @functools.lru_cache(maxsize=16)
-def own_start(a: bytes, b: bytes) -> StartSystem:
-    """Return all roots of a platform with complex leg lengths, the start for any other lengths.
+def platform_start(a: bytes, b: bytes) -> StartSystem:
+    """Return all roots of a platform for random complex leg lengths, as start for any lengths.
 
     Special ends of the legs have fewer than forty roots: 28 for semi-regular hexagons, 16 for legs
     that meet in pairs. The roots are regular, because lengths with singular roots form no open set.
-    Both stored starts must lead to the same roots. If they do not, monodromy around other lengths
+    Both stored starts must give the same roots. If they do not, monodromy around other lengths
     is repeated until three closed paths find no new root.
 
     Args:
@@ -304,10 +338,10 @@ def own_start(a: bytes, b: bytes) -> StartSystem:
     """
     ends = [np.frombuffer(told).reshape(LEGS, 3).astype(complex) for told in (a, b)]
     rng = np.random.default_rng(_SEED)
-    legs, second, third = (PlatformLegs(ends[0], ends[1], _lengths(rng)) for _ in range(3))
+    legs, second, third = (PlatformLegs(ends[0], ends[1], _random_lengths(rng)) for _ in range(3))
     x, counts = np.zeros((0, _SIZE), dtype=complex), list[int]()
     for number in (0, 1):
-        kept = kept_start(number)
+        kept = stored_start(number)
         y, t = follow(Homotopy.between(kept.legs, legs), kept.x)
         own = certify(legs, y, t)
         counts.append(int(np.sum(own.regular)))
@@ -320,7 +354,7 @@ def own_start(a: bytes, b: bytes) -> StartSystem:
             y = y[t >= 1]
         known, x = len(x), _distinct_roots(legs, np.concatenate([x, y]))
         idle = idle + 1 if len(x) == known else 0
-        second, third = (PlatformLegs(ends[0], ends[1], _lengths(rng)) for _ in range(2))
+        second, third = (PlatformLegs(ends[0], ends[1], _random_lengths(rng)) for _ in range(2))
     return StartSystem(legs, x)
 
 
@@ -328,13 +362,13 @@ _IDLE = 3
 """Number of closed paths without new roots after which the roots count as complete."""
 
 
-def _lengths(rng: np.random.Generator) -> Complex:
-    """Return random complex constants c (6,) of `Legs`."""
+def _random_lengths(rng: np.random.Generator) -> Complex:
+    """Return random complex constants c (6,) of `PlatformLegs`: they set the lengths of legs."""
     return rng.normal(size=LEGS) + 1j * rng.normal(size=LEGS)
 
 
 def _distinct_roots(legs: PlatformLegs, x: Complex) -> Complex:
-    """Return the certified regular roots among x, each once."""
+    """Return the roots among x (r, 8) that are certified as regular, each once."""
     ends = certify(legs, x.copy(), np.ones(len(x)))
     return ends.x[ends.regular]
 
@@ -372,7 +406,7 @@ _FOLD = 1e-2
 
 
 def poses(a: Real, b: Real, length: Real) -> Roots:
-    """Return all poses in which six legs have given lengths.
+    """Return all poses of a platform in which six legs have given lengths.
 
     Args:
         a: (6, 3) ends of the legs on the ground [m].
@@ -384,11 +418,11 @@ def poses(a: Real, b: Real, length: Real) -> Roots:
         negative, (r, 7).
 
     Raises:
-        LoopError: the legs hold the platform at no pose.
+        LoopError: the platform can move for constant leg lengths at every pose.
     """
-    middle, own, size = a.mean(axis=0), b.mean(axis=0), _size(a, b)
+    middle, own, size = a.mean(axis=0), b.mean(axis=0), _platform_size(a, b)
     a0, b0 = (a - middle) / size, (b - own) / size
-    if not holds(a, b):
+    if not is_rigid(a, b):
         raise LoopError(
             "the ends of its six legs lie so that they hold the platform at no pose, as on similar"
             " hexagons"
@@ -396,12 +430,12 @@ def poses(a: Real, b: Real, length: Real) -> Roots:
     square = (length / size) ** 2
     c = np.sum(a0**2, axis=1) + np.sum(b0**2, axis=1) - square
     legs = PlatformLegs(a0.astype(complex), b0.astype(complex), c.astype(complex))
-    start = own_start(a0.tobytes(), b0.tobytes())
+    start = platform_start(a0.tobytes(), b0.tobytes())
     path, expected = Homotopy.between(start.legs, legs), len(start.x)
     for tolerance in (TOLERANCE, TOLERANCE / 10, TOLERANCE / 100):
         x, t = follow(path, start.x, tolerance)
         ends = certify(legs, x, t)
-        found = _real(a0, b0, square, ends, t)
+        found = _real_roots(a0, b0, square, ends, t)
         certain = int(np.sum(ends.regular))
         # a double root is the end of two paths
         complete = certain + 2 * found.folds == expected
@@ -414,7 +448,7 @@ def poses(a: Real, b: Real, length: Real) -> Roots:
 
 
 def _rotations(e: Real) -> Real:
-    """Return the rotation matrices (..., 3, 3) of unit quaternions e (r, 4), scalar part first."""
+    """Return the rotation matrices (r, 3, 3) of unit quaternions e (r, 4), scalar part first."""
     w, x, y, z = e.T
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -425,25 +459,33 @@ def _rotations(e: Real) -> Real:
 
 
 def _slopes(a: Real, b: Real, e: Real, p: Real) -> tuple[Real, Real]:
-    """Return squared lengths (r, 6), and half their derivatives by [p; rotation], (r, 6, 6)."""
+    """Return squared leg lengths (r, 6), and half their derivatives by [p; rotation], (r, 6, 6).
+
+    a, b (6, 3) are the leg ends, e (r, 4) and p (r, 3) the poses of the platform.
+    """
     arm = np.einsum("rij,kj->rki", _rotations(e), b)
     way = p[:, None, :] + arm - a
     return np.sum(way**2, axis=2), np.concatenate([way, np.cross(arm, way)], axis=2)
 
 
-def _size(a: Real, b: Real) -> float:
-    """Return the root mean square distance of the leg ends from their means [m]; 1 if it is 0."""
+def _platform_size(a: Real, b: Real) -> float:
+    """Return the root mean square distance of leg ends a, b (6, 3) from their means [m].
+
+    1 if it is zero.
+    """
     return float(np.sqrt(np.mean(np.var(a, axis=0)) + np.mean(np.var(b, axis=0)))) or 1.0
 
 
-def holds(a: Real, b: Real) -> bool:
-    """Whether six legs of suitable lengths hold a platform at some pose.
+def is_rigid(a: Real, b: Real) -> bool:
+    """Whether six legs determine the pose of the platform locally at a generic pose.
+
+    False if the platform can move for constant leg lengths at every pose.
 
     Args:
         a: (6, 3) ends of the legs on the ground [m].
         b: (6, 3) ends on the platform, in its frame [m].
     """
-    a, b = (a - a.mean(axis=0)) / _size(a, b), (b - b.mean(axis=0)) / _size(a, b)
+    a, b = (a - a.mean(axis=0)) / _platform_size(a, b), (b - b.mean(axis=0)) / _platform_size(a, b)
     rng = np.random.default_rng(_SEED)
     e = rng.normal(size=(_POSES, 4))
     e /= np.linalg.norm(e, axis=1, keepdims=True)
@@ -452,15 +494,18 @@ def holds(a: Real, b: Real) -> bool:
 
 
 class _RealRoots(NamedTuple):
-    """Quaternions (r, 4), positions (r, 3) in sizes, and the number of roots at folds."""
+    """Real roots: quaternions e (r, 4), positions p (r, 3) in sizes, and number of double roots."""
 
     e: Real
     p: Real
     folds: int
 
 
-def _real(a: Real, b: Real, square: Real, ends: PathEnds, t: Real) -> _RealRoots:
-    """Return the real roots among the ends of paths that reached t (r,)."""
+def _real_roots(a: Real, b: Real, square: Real, ends: PathEnds, t: Real) -> _RealRoots:
+    """Return the real roots among the ends of paths that reached t (r,).
+
+    a, b (6, 3) are the leg ends, `square` (6,) the squared lengths, all in sizes of the platform.
+    """
     near = t > 1 - _FOLD
     near &= np.linalg.norm(ends.x[:, :4], axis=1) > _FLAT**0.5
     order = np.argsort(~ends.regular[near], kind="stable")
@@ -474,7 +519,7 @@ def _real(a: Real, b: Real, square: Real, ends: PathEnds, t: Real) -> _RealRoots
     g = x[:, 4:] / np.linalg.norm(x[:, :4], axis=1, keepdims=True)
     # p = g e*: its vector part
     p = -g[:, :1] * e[:, 1:] + e[:, :1] * g[:, 1:] - np.cross(g[:, 1:], e[:, 1:])
-    e, p, error = _refined(a, b, square, e, p)
+    e, p, error = _refined_poses(a, b, square, e, p)
     kept = list[int]()
     for k in np.flatnonzero(error < _CLOSED):
         if not any(_is_same(e[k], p[k], e[other], p[other]) for other in kept):
@@ -484,13 +529,13 @@ def _real(a: Real, b: Real, square: Real, ends: PathEnds, t: Real) -> _RealRoots
 
 
 def _is_same(e: Real, p: Real, other_e: Real, other_p: Real) -> bool:
-    """Whether two poses are equal; quaternions e and -e are the same orientation."""
+    """Whether the poses (e, p) and (other_e, other_p) are equal; e and -e are one orientation."""
     turn = min(np.max(np.abs(e - other_e)), np.max(np.abs(e + other_e)))
     return bool(max(turn, np.max(np.abs(p - other_p))) < _SAME)
 
 
-def _refined(a: Real, b: Real, square: Real, e: Real, p: Real) -> tuple[Real, Real, Real]:
-    """Refine real poses by Newton's method; return e, p, largest errors of squared lengths (r,).
+def _refined_poses(a: Real, b: Real, square: Real, e: Real, p: Real) -> tuple[Real, Real, Real]:
+    """Refine real poses by Newton's method; return e, p, and errors of squared lengths (r,).
 
     Steps without improvement are halved, because their length has no bound at a fold.
     """
@@ -504,7 +549,7 @@ def _refined(a: Real, b: Real, square: Real, e: Real, p: Real) -> tuple[Real, Re
         step = -np.linalg.pinv(2 * J, rcond=_LOOSE) @ (value - square)[..., None]
         step = share[:, None] * step[..., 0]
         turn = np.concatenate([np.ones((len(e), 1)), step[:, 3:] / 2], axis=1)
-        tried = _products(turn, e)
+        tried = _hamilton_products(turn, e)
         tried /= np.linalg.norm(tried, axis=1, keepdims=True)
         place = p + step[:, :3]
         other, slope = _slopes(a, b, tried, place)
@@ -520,7 +565,7 @@ def _refined(a: Real, b: Real, square: Real, e: Real, p: Real) -> tuple[Real, Re
     return e, p, worst
 
 
-def _products(e: Real, other: Real) -> Real:
+def _hamilton_products(e: Real, other: Real) -> Real:
     """Return the Hamilton products (r, 4) of quaternions e and `other`."""
     scalar = e[:, :1] * other[:, :1] - np.sum(e[:, 1:] * other[:, 1:], axis=1, keepdims=True)
     vector = e[:, :1] * other[:, 1:] + other[:, :1] * e[:, 1:] + np.cross(e[:, 1:], other[:, 1:])

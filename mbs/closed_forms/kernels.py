@@ -39,14 +39,18 @@ _KERNELS: tuple[Callable[[Ring, SX, SX], LoopBranches | None], ...] = (
 
 
 def closed_form(ring: Ring, q: SX, p: SX) -> LoopBranches | str:
-    """Return the branches of some unknown positions of a loop, or text on why no kernel fits.
+    """Return the branches of some unknown positions of a loop, from the first kernel that fits.
 
-    The other positions can be solved once these are known.
+    A kernel is a solution method for one arrangement of joints. The other positions can be solved
+    once these are known.
 
     Args:
         ring: loop chain.
         q: symbols of positions, cut joints included.
         p: (np, 1) symbols of parameters.
+
+    Returns:
+        Branches, or text that describes why no kernel fits.
     """
     if any(joint.motion is Motion.FREE for joint in ring.joints) and len(ring.joints) > 1:
         return "a free body is in it"

@@ -6,7 +6,13 @@ import casadi
 from casadi import SX
 
 from mbs.closed_forms.centres import with_spherical
-from mbs.closed_forms.ring import always_zero, gap_samples, is_planar, with_elbow, without_idle
+from mbs.closed_forms.ring import (
+    always_zero,
+    gap_samples,
+    is_planar,
+    with_elbow,
+    without_unused_freedom,
+)
 from mbs.closed_forms.roots import (
     LoopBranches,
     Positions,
@@ -44,7 +50,7 @@ def three_revolute(ring: Ring) -> LoopBranches:
 
 
 def _three_revolute_root(ring: Ring, sign: int) -> Positions:
-    """Return the positions of a triangle of three revolute joints; sign selects the branch."""
+    """Return the positions of a triangle of three revolute joints on branch `sign` (1 or -1)."""
     X1, X2, X3 = (gap.pose for gap in ring.gaps)
     g, d2, d3 = (in_plane(p) for p in (X1.inverse().p, X2.p, X3.p))
     R1, R2, R3 = (in_plane(pose.R) for pose in (X1, X2, X3))
@@ -77,7 +83,7 @@ def one_prismatic(ring: Ring) -> LoopBranches:
 
 
 def _one_prismatic_root(ring: Ring, sign: int) -> Positions:
-    """Return the positions of a plane loop of two revolute joints and one prismatic joint."""
+    """Return the positions of a plane loop with a prismatic middle joint on branch `sign`."""
     X1, X2, X3 = (gap.pose for gap in ring.gaps)
     R = X2.R @ X3.R
     g, e, u = (in_plane(p) for p in (X1.inverse().p, X2.p + X2.R @ X3.p, X2.R[:, 2]))
@@ -137,7 +143,7 @@ def parallelogram(ring: Ring, pivot: int) -> LoopBranches:
 
 
 def _parallelogram_root(ring: Ring, A: SX, B: SX) -> Positions:
-    """Return positions with the links along A and B, both vectors in the frame before joint a."""
+    """Return the positions with the links along A and B (2, 1), in the frame before joint a."""
     X1, X2, X3 = (gap.pose for gap in ring.gaps)
     R1, R2, R3 = (in_plane(pose.R) for pose in (X1, X2, X3))
     a = angle_onto(in_plane(X2.p), A)
@@ -154,11 +160,16 @@ def planar(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
     Motions of a closing joint out of the plane are ignored. A spherical joint, or three revolute
     joints that intersect in one point, count as a revolute joint.
+
+    Args:
+        ring: loop chain.
+        q: symbols of positions.
+        p: symbols of parameters.
     """
     ring = with_spherical(ring, q, p)
     spherical = sum(joint.motion is _SPHERICAL for joint in ring.joints)
     while len(ring.joints) > 3 and not spherical:
-        smaller = without_idle(ring, gap_samples(ring, q, p))
+        smaller = without_unused_freedom(ring, gap_samples(ring, q, p))
         if smaller is ring:
             return None
         ring = smaller
@@ -172,7 +183,7 @@ def planar(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def _spherical_last(ring: Ring) -> Ring:
-    """Return the loop, rotated so that a spherical joint is at its end."""
+    """Return the loop with its start chosen so that a spherical joint is its last joint."""
     for k, joint in enumerate(ring.joints):
         if joint.motion is _SPHERICAL:
             return ring.rotated((k + 1) % len(ring.joints))
@@ -180,7 +191,7 @@ def _spherical_last(ring: Ring) -> Ring:
 
 
 def _planar_branches(ring: Ring, prismatic: list[int], q: SX, p: SX) -> LoopBranches:
-    """Return both branches of a plane loop of three joints.
+    """Return the branches of a plane loop of three joints, according to their types.
 
     Args:
         ring: loop chain.
@@ -198,12 +209,15 @@ def _planar_branches(ring: Ring, prismatic: list[int], q: SX, p: SX) -> LoopBran
         revolute = next(k for k in range(3) if k not in prismatic)
         return two_prismatic(ring.rotated(revolute))
     ring = ring if has_spherical else with_elbow(ring, q)
-    pivot = _opposite(ring, q, p)
+    pivot = _parallelogram_axis(ring, q, p)
     return three_revolute(ring) if pivot is None else parallelogram(ring, pivot)
 
 
-def _opposite(ring: Ring, q: SX, p: SX) -> int | None:
-    """Return the index of the known axis that makes the loop a parallelogram, or None."""
+def _parallelogram_axis(ring: Ring, q: SX, p: SX) -> int | None:
+    """Return the index of the known axis that makes the loop a parallelogram; None without one.
+
+    q and p are the symbols of positions and parameters.
+    """
     back = ring.gaps[0].pose.inverse()
     A, B = (square(in_plane(gap.pose.p)) for gap in ring.gaps[1:])
     for number, pivot in enumerate(ring.gaps[0].pivots):
@@ -224,7 +238,15 @@ def _opposite(ring: Ring, q: SX, p: SX) -> int | None:
 
 
 def along_normal(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """Return the displacement along parallel revolute axes; None unless one joint has it."""
+    """Return the displacement of the only prismatic joint that moves along parallel revolute axes.
+
+    None if the revolute axes are not parallel, or not exactly one prismatic joint moves along them.
+
+    Args:
+        ring: loop chain.
+        q: symbols of positions.
+        p: symbols of parameters.
+    """
     ring = with_spherical(ring, q, p)
     kinds = [joint.motion for joint in ring.joints]
     if kinds.count(Motion.SPHERICAL) > 1 or Motion.REVOLUTE not in kinds:

@@ -81,7 +81,13 @@ class PlanarLoops:
         return whole[:, self.carriers]
 
     def with_known(self, part: PlanarPart, theta: Real, s: Real) -> PlanarLoops:
-        """Return the rows for known unknowns of a part: their columns are added to the constant."""
+        """Return the rows of the remaining unknowns, with the values of a part inserted.
+
+        Args:
+            part: unknowns that are known now.
+            theta: values of its directions [rad].
+            s: values of its displacements, divided by the size.
+        """
         n, m = self.counts
         every_theta, every_s = np.zeros((1, n)), np.zeros((1, m))
         every_theta[0, part.angles], every_s[0, part.slides] = theta, s
@@ -186,13 +192,17 @@ def planar_roots(loops: PlanarLoops) -> Roots:
 
 
 def _solve(loops: PlanarLoops) -> tuple[Real, Real, list[_PartRoots]]:
-    """Return angles and displacements of all roots, and the results of the parts."""
+    """Return angles (r, n) and displacements (r, m) of all roots, and the results of each part.
+
+    `loops` are the rows of all loops; n and m are the numbers of unknown directions and
+    displacements.
+    """
     n, m = loops.counts
     if n + m == 0:
         closed = int(np.all(np.abs(loops.constant) < _DEPENDENT))
         return np.zeros((closed, 0)), np.zeros((closed, 0)), []
     part = _smallest_part(loops)
-    own = _irreducible(_of_part(loops, part))
+    own = _irreducible(_part_rows(loops, part))
     parts, theta, s = [own], list[Real](), list[Real]()
     rest = (
         [k for k in range(n) if k not in part.angles],
@@ -215,7 +225,10 @@ loops 252."""
 
 
 def _smallest_part(loops: PlanarLoops) -> PlanarPart:
-    """Return the smallest set of rows and unknowns that can be solved by itself."""
+    """Return the smallest set of unknowns that some rows of `loops` determine alone.
+
+    Raises NoClosedForm if it has more than eight unknowns.
+    """
     n, m = loops.counts
     columns = np.concatenate([loops.angles, loops.slides], axis=1)
     for size in range(1, min(n + m, _LARGEST) + 1):
@@ -233,7 +246,7 @@ def _smallest_part(loops: PlanarLoops) -> PlanarPart:
 
 
 def _left_null(columns: Complex) -> Complex:
-    """Return rows (d, L) whose products with the columns vanish."""
+    """Return orthonormal rows (d, L) whose products with the columns (L, k) vanish."""
     if not columns.shape[1]:
         return np.eye(len(columns), dtype=complex)
     U, values, _ = np.linalg.svd(columns)
@@ -242,7 +255,7 @@ def _left_null(columns: Complex) -> Complex:
 
 
 def _rank(matrix: Complex) -> int:
-    """Return the number of singular values above a small threshold."""
+    """Return the number of singular values of a matrix above 1e-10."""
     if not matrix.size:
         return 0
     values = np.linalg.svd(matrix, compute_uv=False)
@@ -250,8 +263,8 @@ def _rank(matrix: Complex) -> int:
     return int(np.sum(values > _SMALL))
 
 
-def _of_part(loops: PlanarLoops, part: PlanarPart) -> PlanarLoops:
-    """Return the rows of a part alone, with no more rows than it needs."""
+def _part_rows(loops: PlanarLoops, part: PlanarPart) -> PlanarLoops:
+    """Return the rows of the unknowns of a part alone, with no more rows than it needs."""
     rows = part.rows
     columns = np.concatenate([loops.angles[:, part.angles], loops.slides[:, part.slides]], axis=1)
     needed = (part.size + 1) // 2
@@ -269,7 +282,7 @@ def _of_part(loops: PlanarLoops, part: PlanarPart) -> PlanarLoops:
 
 
 def _irreducible(loops: PlanarLoops) -> _PartRoots:
-    """Return the roots of a part that cannot be split further, and the solution method."""
+    """Return the roots of a part that cannot be split further, refined and each once."""
     n, m = loops.counts
     if n + m == 1:
         found = _one_unknown(loops)
@@ -279,7 +292,7 @@ def _irreducible(loops: PlanarLoops) -> _PartRoots:
         found = _dyad(loops)
     elif m == 0:
         found = dixon_roots(loops.angles, loops.constant)
-    elif n + m == 4 and _hidden(loops) is not None:
+    elif n + m == 4 and _best_triad(loops) is not None:
         found = triad_roots(loops)
     else:
         found = path_roots(loops)
@@ -290,7 +303,7 @@ def _irreducible(loops: PlanarLoops) -> _PartRoots:
 
 
 def _one_unknown(loops: PlanarLoops) -> _PartRoots:
-    """Return the only direction or displacement of a row that is sufficient for two unknowns."""
+    """Return the root of loops with a single unknown, a direction or a displacement."""
     n, _ = loops.counts
     a = (loops.angles if n else loops.slides)[:, 0]
     value = -np.vdot(a, loops.constant) / np.vdot(a, a)
@@ -327,7 +340,7 @@ dyad: rounding of lengths relative to the size."""
 
 
 def _dyad(loops: PlanarLoops) -> _PartRoots:
-    """Return both roots of a single complex row with two unknowns."""
+    """Return the real roots of `loops` with a single row and two unknowns: none, one or two."""
     method = "the quadratic equation of a dyad"
     n, _ = loops.counts
     b = loops.constant[0]
@@ -354,7 +367,10 @@ def _dyad(loops: PlanarLoops) -> _PartRoots:
 
 
 def _angles_of(w: complex, value: float) -> list[float]:
-    """Return the angles t with Re(w e^(i t)) = value."""
+    """Return the angles t [rad] with Re(w e^(i t)) = value: two, or none.
+
+    Raises LoopError if the equation holds for all angles.
+    """
     if abs(w) < _SMALL:
         if abs(value) < _SMALL:
             raise LoopError("a dyad of equal links can turn about its own end")
@@ -387,10 +403,15 @@ squared distance, so that roots 1e-6 apart are distinguished."""
 
 
 def refine(loops: PlanarLoops, theta: Real, s: Real) -> tuple[Real, Real, Real]:
-    """Refine roots to rounding by Newton's method.
+    """Refine roots to rounding by Newton's method on all unknowns.
+
+    Args:
+        loops: closure rows.
+        theta: (r, n) angles of the links [rad].
+        s: (r, m) displacements, divided by the size.
 
     Returns:
-        (r, n) angles within half a rotation of zero, (r, m) displacements, (r,) largest rows.
+        (r, n) angles in (-pi, pi], (r, m) displacements, and (r,) largest closure errors.
     """
     n = theta.shape[1]
     x = np.concatenate([theta, s], axis=1)
@@ -419,7 +440,10 @@ def refine(loops: PlanarLoops, theta: Real, s: Real) -> tuple[Real, Real, Real]:
 
 
 def _distinct(loops: PlanarLoops, theta: Real, s: Real, residual: Real) -> tuple[Real, Real]:
-    """Return the different roots, each with the smallest residual of its copies."""
+    """Return the different roots, each with the smallest `residual` (r,) among its copies.
+
+    theta (r, n) and s (r, m) are the angles and displacements of the roots.
+    """
     kept = list[int]()
     for k in np.argsort(residual, kind="stable"):
         if not any(
@@ -430,7 +454,10 @@ def _distinct(loops: PlanarLoops, theta: Real, s: Real, residual: Real) -> tuple
 
 
 def _is_same(loops: PlanarLoops, theta: Real, s: Real, residual: float) -> bool:
-    """Whether two roots (2, n), (2, m) are the same; the first one has the larger residual."""
+    """Whether two roots theta (2, n), s (2, m) are the same.
+
+    The first has the larger closure error, `residual`.
+    """
     turn = pi - np.mod(pi - (theta[0] - theta[1]), 2 * pi)
     slide = s[0] - s[1]
     if max(np.max(np.abs(turn), initial=0.0), np.max(np.abs(slide), initial=0.0)) > _SAME:
@@ -515,7 +542,7 @@ class _Pencil:
     Q: Complex
 
     def angles(self, x: complex, t: Complex) -> Real:
-        """Return the angles of all directions at a root x with null vector t."""
+        """Return angles [rad] of all directions at a root x with null vector t of the pencil."""
         theta = np.zeros(len(self.others) + 1)
         theta[self.hidden] = np.angle(x)
         place = {product: k for k, product in enumerate(self.products)}
@@ -531,13 +558,16 @@ class _Pencil:
 
 
 def _sign(order: tuple[int, ...]) -> int:
-    """Return the sign of a permutation."""
+    """Return the sign, 1 or -1, of the permutation `order` of 0, 1, ..."""
     swaps = sum(a > b for k, a in enumerate(order) for b in order[k + 1 :])
     return -1 if swaps % 2 else 1
 
 
 def _pencil(angles: Complex, constant: Complex, hidden: int) -> _Pencil | None:
-    """Return the matrix pencil whose eigenvalues are the values of a hidden direction, or None."""
+    """Return the pencil whose eigenvalues are the values of the direction with index `hidden`.
+
+    `angles` (L, 2 L) and `constant` (L,) are as in `dixon_roots`. None if it vanishes.
+    """
     L, n = angles.shape
     others = [k for k in range(n) if k != hidden]
     a, b, c = angles, constant, angles[:, hidden]
@@ -589,7 +619,10 @@ are no roots are possible."""
 
 
 def _eigenvectors(pencil: _Pencil) -> Iterator[tuple[Complex, Complex]]:
-    """Yield the roots x and null vectors (columns); nothing if the pencil is singular for all x."""
+    """Yield the eigenvalues x and null vectors (columns) of a pencil once.
+
+    Nothing is yielded if the pencil is singular for all x.
+    """
     scale = 1 / np.maximum(np.abs(pencil.P), np.abs(pencil.Q)).max(axis=1)
     P, Q = scale[:, None] * pencil.P, scale[:, None] * pencil.Q
     shifted = [P + x * Q for x in _PLACES]
@@ -629,18 +662,24 @@ _TAIL = 1e-8
 def triad_roots(loops: PlanarLoops) -> _PartRoots:
     """Return candidates for the unknowns of two loops with prismatic joints.
 
+    Args:
+        loops: two closure rows in four unknowns, for which `_best_triad` returns a triad.
+
     Raises:
         LoopError: the polynomial vanishes for all directions.
     """
-    triad = _hidden(loops)
+    triad = _best_triad(loops)
     assert triad is not None  # tested by the caller
     angle, degree = triad.angles()
     theta, s = triad.unknowns(angle)
     return _PartRoots(theta, s, f"the polynomial of a triad, of degree {degree}")
 
 
-def _hidden(loops: PlanarLoops) -> _Triad | None:
-    """Return the triad with a hidden direction that leaves three circles or lines; None without."""
+def _best_triad(loops: PlanarLoops) -> _Triad | None:
+    """Return a triad of `loops` with the first hidden direction that is possible, or None.
+
+    The rest of the equations are circles or lines of the complex number t of another direction.
+    """
     for hidden in range(loops.counts[0]):
         if all(k in (KNOWN, hidden) for k in loops.carriers):
             triad = _Triad.of(loops, hidden)
@@ -667,7 +706,7 @@ class _Triad:
 
     @staticmethod
     def of(loops: PlanarLoops, hidden: int) -> _Triad | None:
-        """Return the triad; None if two of the three columns are parallel."""
+        """Return the triad with a hidden direction; None if two columns are parallel."""
         others = [k for k in range(loops.counts[0]) if k != hidden]
         columns = np.concatenate([loops.angles[:, others], loops.slides], axis=1)
         alpha = np.linalg.svd(columns)[2][-1].conj()
@@ -708,7 +747,10 @@ class _Triad:
         return N, D, value
 
     def angles(self) -> tuple[Real, int]:
-        """Return angles of the hidden direction near roots of the polynomial, and its degree."""
+        """Return the angles [rad] of the hidden direction near real roots, and the degree.
+
+        Raises LoopError if the polynomial vanishes for all directions.
+        """
         x = np.exp(2j * pi * np.arange(_SAMPLES) / _SAMPLES)
         spectrum = np.fft.fft(self._meeting(x)[2]) / _SAMPLES
         coefficients = spectrum[np.arange(-3, 4)]  # of x^-3 .. x^3
@@ -727,7 +769,7 @@ class _Triad:
         return np.angle(roots[near]), 2 * degree
 
     def unknowns(self, angle: Real) -> tuple[Real, Real]:
-        """Return all unknowns at angles (r,) of the hidden direction."""
+        """Return theta (r, n) and s (r, m) at angles (r,) [rad] of the hidden direction."""
         x = np.exp(1j * angle)
         N, D, _ = self._meeting(x)
         y = self._curves(x)[3] + (N / np.where(D == 0, NONZERO, D))[:, None] * self.alpha
@@ -780,6 +822,7 @@ class _Rows:
 
     @staticmethod
     def of(loops: PlanarLoops) -> _Rows:
+        """Return the rows of plane loops with their conjugates."""
         P = np.concatenate([loops.angles, loops.slides, loops.constant[:, None]], axis=1)
         return _Rows(np.array([P, P.conj()]), loops.carriers)
 
@@ -807,14 +850,17 @@ class _Rows:
         return w, dw
 
     def values(self, x: Complex) -> tuple[Complex, Complex]:
-        """Return the rows (r, 2 L) and their derivatives (r, 2 L, n + m)."""
+        """Return the rows (r, 2 L) at unknowns x (r, n + m), and derivatives (r, 2 L, n + m)."""
         w, dw = self.terms(x)
         size = self.P.shape[0] * self.P.shape[1]
         rows = np.einsum("klc,rkc->rkl", self.P, w).reshape(len(x), size)
         return rows, np.einsum("klc,rkcj->rklj", self.P, dw).reshape(len(x), size, x.shape[1])
 
     def followed(self, other: _Rows, x: Complex) -> tuple[Complex, Real]:
-        """Follow roots x along a path to other rows; return the ends and the reached t (r,)."""
+        """Track roots x (r, n + m) of these rows to roots of other rows along a straight path.
+
+        Return the ends and the reached path parameter t (r,), 1 at a completed path.
+        """
         change = other.P - self.P
 
         def newton(x: Complex, t: Real, _: Complex) -> tuple[Complex, Complex]:
@@ -831,7 +877,7 @@ class _Rows:
         return follow(newton, x, lambda x, slope: (x, slope))
 
     def certified(self, x: Complex) -> tuple[Complex, Real]:
-        """Return the certified roots near x, each once, and their error bounds (radius).
+        """Return certified roots near x, each once, and their error bounds (radius) per unknown.
 
         Source: Ortega & Rheinboldt 1970, section 12.6; in floating point, with room for rounding.
         """
@@ -861,12 +907,12 @@ class _Rows:
 
 
 def _random(rng: np.random.Generator, *shape: int) -> Complex:
-    """Return random complex numbers with normally distributed parts."""
+    """Return random complex numbers whose real and imaginary parts are normally distributed."""
     return np.asarray(rng.normal(size=shape) + 1j * rng.normal(size=shape), np.complex128)
 
 
 @functools.lru_cache(maxsize=16)
-def _start(links: bytes, count: int, carriers: tuple[int, ...]) -> tuple[_Rows, Complex]:
+def _random_start(links: bytes, count: int, carriers: tuple[int, ...]) -> tuple[_Rows, Complex]:
     """Return random rows and all their roots.
 
     Args:
@@ -901,12 +947,15 @@ def _start(links: bytes, count: int, carriers: tuple[int, ...]) -> tuple[_Rows, 
 def path_roots(loops: PlanarLoops) -> _PartRoots:
     """Return the unknowns of any loops, by path tracking from random loops.
 
-    The paths first lead to random constants. The number of regular ends is the number of roots for
+    The paths first run to random constants. The number of regular ends is the number of roots for
     generic constants with these links, which is the maximum for all constants.
+
+    Args:
+        loops: closure rows, two real equations for each pair of unknowns.
     """
     n, _ = loops.counts
     links = np.abs(np.concatenate([loops.angles, loops.slides], axis=1)) > _SMALL
-    start, x = _start(links.tobytes(), len(links), tuple(int(k) for k in loops.carriers))
+    start, x = _random_start(links.tobytes(), len(links), tuple(int(k) for k in loops.carriers))
     rows = _Rows.of(loops)
     general = rows.with_constants(np.random.default_rng(_MONODROMY_SEED))
     y, t = start.followed(general, x)
@@ -927,7 +976,7 @@ def path_roots(loops: PlanarLoops) -> _PartRoots:
 
 
 def _is_near(x: Real, roots: Real, n: int) -> bool:
-    """Whether x is equal to one of the roots; the first n elements are angles."""
+    """Whether x (n + m,) equals one of the roots (r, n + m); the first n elements are angles."""
     gap = roots - x
     gap[:, :n] = pi - np.mod(pi - gap[:, :n], 2 * pi)
     return bool(np.any(np.max(np.abs(gap), axis=1) < _SAME_ROOT))

@@ -7,7 +7,7 @@ Source: Khalil & Creusot 1997, eq. 2.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable
+from collections.abc import Container
 from dataclasses import dataclass
 
 import casadi
@@ -25,7 +25,6 @@ from mbs.expressions import to_sx
 from mbs.recursions.chain import (
     ChainBuilder,
     ChainJoint,
-    Gap,
     Ring,
     Spin,
     links_between,
@@ -44,13 +43,25 @@ from mbs.spatial import Pose, align_z, vector
 
 
 def cut_indices(system: System) -> tuple[int, ...]:
-    """Return the first position index of each cut joint, and the end of the last one."""
+    """Return the first position index of each cut joint, and the end of the last one.
+
+    Indices of positions are those in q, then those of cut joints, then spins of rods.
+
+    Args:
+        system: system with closed loops.
+    """
     counts = [max(1, len(cut.edge.joint.freedoms)) for cut in system.cuts]
     return tuple(system.nq + sum(counts[:k]) for k in range(len(counts) + 1))
 
 
 def spin_indices(system: System) -> dict[int, int]:
-    """Return the position index of each rod spin, by the first index in q of its quaternion."""
+    """Return the position index of each rod spin, by the first index in q of its quaternion.
+
+    A spin is the rotation of a rod with two spherical joints about its own line.
+
+    Args:
+        system: system with closed loops.
+    """
     spherical = [
         link.q.start
         for link in system.tree.links
@@ -62,12 +73,19 @@ def spin_indices(system: System) -> dict[int, int]:
 
 
 def extent(system: System) -> int:
-    """Return the number of all positions: q, cut joints and rod spins."""
+    """Return the number of all positions: those in q, of cut joints, and rod spins.
+
+    Args:
+        system: system with closed loops.
+    """
     return cut_indices(system)[-1] + len(spin_indices(system))
 
 
 def independent_indices(system: System) -> list[int]:
     """Return the position indices of the independent joints, in the order of `system.free`.
+
+    Args:
+        system: system with closed loops.
 
     Raises:
         NoClosedForm: a body is free, or a spherical joint has more than one independent rotation.
@@ -77,13 +95,13 @@ def independent_indices(system: System) -> list[int]:
         link = next(link for link in system.tree.links if link.v.start <= k < link.v.stop)
         index = link.q.start if link.motion.nq == 1 else spins.get(link.q.start)
         if index is None or index in indices:
-            raise NoClosedForm(_unplaced(system, link))
+            raise NoClosedForm(_undetermined_text(system, link))
         indices.append(index)
     return indices
 
 
-def _unplaced(system: System, link: Link) -> str:
-    """Return the error message for a quaternion that independent positions do not determine."""
+def _undetermined_text(system: System, link: Link) -> str:
+    """Return the error message for a quaternion that the independent positions do not determine."""
     return (
         f"{system.name}: the quaternion of {link.name} rotates freely, and the positions of"
         " independent joints cannot tell how; use mbs.loops.solve without branch"
@@ -91,7 +109,15 @@ def _unplaced(system: System, link: Link) -> str:
 
 
 def loop_links(system: System, cut: Cut) -> tuple[list[int], list[int]]:
-    """Return link indices from frame_a of a cut joint to the common link, and on to frame_b."""
+    """Return the link indices of the two sides of the loop of a cut joint.
+
+    Args:
+        system: system of the cut joint.
+        cut: cut joint.
+
+    Returns:
+        Indices from its frame_a to the common link, and from there to its frame_b.
+    """
     return links_between(system.tree, cut.link_a, cut.link_b)
 
 
@@ -108,7 +134,7 @@ def ring_of(system: System, number: int, known: Container[int], q: SX) -> Ring:
     a, b = (cut.link_a, cut.pose_a), (cut.link_b, cut.pose_b)
     builder.along_tree(system.tree, a, b, _spins(system))
     if not cut.welded:
-        _pass_cut(builder, system, number)
+        _append_cut_joint(builder, system, number)
     return builder.chain().ring()
 
 
@@ -118,8 +144,8 @@ def _spins(system: System) -> dict[int, Spin]:
     return {start: Spin(index, rest[start]) for start, index in spin_indices(system).items()}
 
 
-def _pass_cut(builder: ChainBuilder, system: System, number: int) -> None:
-    """Append the freedoms of the cut joint to the chain, from its frame_b to its frame_a."""
+def _append_cut_joint(builder: ChainBuilder, system: System, number: int) -> None:
+    """Append the freedoms of cut joint `number` to the chain, from its frame_b to its frame_a."""
     joint = system.cuts[number].edge.joint
     spherical = ChainJoint(joint.name, Motion.SPHERICAL, None, -1, cut=True)
     freedoms = joint.freedoms
@@ -164,17 +190,21 @@ _Z = np.array([0.0, 0.0, 1.0])
 
 
 def gap_samples(ring: Ring, q: SX, p: SX) -> list[list[Matrix]]:
-    """Return the (4, 4) pose of each known transform at three random positions and parameters."""
-    return [[np.array(DM(T)) for T in values] for values in _evaluate(_matrices(ring.gaps), q, p)]
+    """Return the poses (4, 4) of all known transforms of a loop, at three random samples.
+
+    Args:
+        ring: loop chain.
+        q: symbols of positions, which are random in each sample.
+        p: symbols of parameters, which are random in each sample.
+    """
+    return [
+        [np.array(DM(T)) for T in values]
+        for values in _values_at_samples([gap.pose.matrix for gap in ring.gaps], q, p)
+    ]
 
 
-def _matrices(gaps: Iterable[Gap]) -> list[SX]:
-    """Return the matrices (4, 4) of the known transforms of a loop."""
-    return [gap.pose.matrix for gap in gaps]
-
-
-def _evaluate(values: list[SX], q: SX, p: SX) -> list[list[DM]]:
-    """Return expressions of q and p at several random positions and parameters."""
+def _values_at_samples(values: list[SX], q: SX, p: SX) -> list[list[DM]]:
+    """Return the values of expressions of q and p at three random positions and parameters."""
     rng = np.random.default_rng(_SURVEY_SEED)
     function = Function("samples", [q, p], values)
     return [
@@ -186,12 +216,15 @@ def _evaluate(values: list[SX], q: SX, p: SX) -> list[list[DM]]:
 
 
 def meeting_point(pose: Pose) -> tuple[SX, SX]:
-    """Return the intersection of the z axes of two frames, as a coordinate along each axis.
+    """Return the intersection of the z axes of two frames, as a coordinate along each axis [m].
 
     The axes must intersect and must not be parallel.
 
     Args:
         pose: pose of the second frame relative to the first.
+
+    Returns:
+        Coordinate along the first axis, and along the second axis.
     """
     slope, offset = pose.R[0:2, 2], pose.p[0:2]
     second = -(slope.T @ offset) / (slope.T @ slope)
@@ -199,7 +232,13 @@ def meeting_point(pose: Pose) -> tuple[SX, SX]:
 
 
 def axes_meet(pose: Pose, q: SX, p: SX) -> bool:
-    """Whether the z axes of two frames intersect in one point, for all positions and parameters."""
+    """Whether the z axes of two frames intersect in one point, for all positions and parameters.
+
+    Args:
+        pose: pose of the second frame relative to the first.
+        q: symbols of positions.
+        p: symbols of parameters.
+    """
     slope, offset = pose.R[0:2, 2], pose.p[0:2]
     return not parallel(pose, q, p) and always_zero(
         slope[0] * offset[1] - slope[1] * offset[0], q, p
@@ -207,27 +246,52 @@ def axes_meet(pose: Pose, q: SX, p: SX) -> bool:
 
 
 def parallel(pose: Pose, q: SX, p: SX) -> bool:
-    """Whether the z axes of two frames are parallel, for all positions and parameters."""
+    """Whether the z axes of two frames are parallel, for all positions and parameters.
+
+    Args:
+        pose: pose of the second frame relative to the first.
+        q: symbols of positions.
+        p: symbols of parameters.
+    """
     return always_zero(pose.R[0:2, 2], q, p)
 
 
 def always_zero(values: SX, q: SX, p: SX) -> bool:
-    """Whether each element is zero for all positions and parameters."""
-    samples = [np.array(value).ravel() for (value,) in _evaluate([values], q, p)]
+    """Whether each element of an expression is zero for all positions and parameters.
+
+    It is decided at three random samples.
+
+    Args:
+        values: expression.
+        q: symbols of positions.
+        p: symbols of parameters.
+    """
+    samples = [np.array(value).ravel() for (value,) in _values_at_samples([values], q, p)]
     return all(bool(np.all(np.abs(sample) < _CLOSE)) for sample in samples)
 
 
 def constants(values: SX, q: SX, p: SX) -> list[float | None]:
-    """Return each element that does not depend on positions and parameters, else None."""
-    samples = np.array([np.array(value).ravel() for (value,) in _evaluate([values], q, p)])
+    """Return each element of an expression as a number if it is constant, else None.
+
+    Args:
+        values: expression.
+        q: symbols of positions on which an element may depend.
+        p: symbols of parameters on which an element may depend.
+    """
+    samples = np.array([np.array(value).ravel() for (value,) in _values_at_samples([values], q, p)])
     same = np.all(np.abs(samples - samples[0]) < _CLOSE, axis=0)
     return [float(x) if fixed else None for x, fixed in zip(samples[0], same, strict=True)]
 
 
-def without_idle(ring: Ring, samples: list[list[Matrix]]) -> Ring:
+def without_unused_freedom(ring: Ring, samples: list[list[Matrix]]) -> Ring:
     """Return the loop without one freedom of its cut joint that a plane loop never uses.
 
-    Such a freedom is a translation along the normal, or a rotation about an axis in the plane.
+    Such a freedom is a translation along the normal, or a rotation about an axis in the plane. The
+    same object is returned if there is none.
+
+    Args:
+        ring: loop chain.
+        samples: poses of its known transforms at samples, from `gap_samples`.
     """
     start = _first_revolute(ring)
     if start is None:
@@ -243,7 +307,14 @@ def without_idle(ring: Ring, samples: list[list[Matrix]]) -> Ring:
 
 
 def with_elbow(ring: Ring, q: SX) -> Ring:
-    """Return the loop of three joints with a middle joint between two rigid links, if possible."""
+    """Return a loop of three joints, started so that rigid links adjoin the joint in the middle.
+
+    The loop is unchanged if no start has this property.
+
+    Args:
+        ring: loop chain of three joints.
+        q: symbols of positions.
+    """
     for k in range(3):
         begun = ring.rotated(k)
         sides = casadi.vertcat(*(casadi.vec(gap.pose.matrix) for gap in begun.gaps[1:]))
@@ -256,6 +327,10 @@ def is_planar(ring: Ring, samples: list[list[Matrix]]) -> bool:
     """Whether all rotations are about one direction, and all translations perpendicular to it.
 
     A spherical joint at the end of the loop may act as a revolute joint.
+
+    Args:
+        ring: loop chain.
+        samples: poses of its known transforms at samples, from `gap_samples`.
     """
     start = _first_revolute(ring)
     if start is None:
@@ -264,7 +339,9 @@ def is_planar(ring: Ring, samples: list[list[Matrix]]) -> bool:
     n = len(ring.joints)
     ends = range(start + 1, n) if spherical else range(start + 1, start + n + 1)
     return all(
-        _fits(ring.joints[k % n].motion, _normal(gaps, start, k)) for gaps in samples for k in ends
+        _fits_plane(ring.joints[k % n].motion, _normal(gaps, start, k))
+        for gaps in samples
+        for k in ends
     )
 
 
@@ -275,14 +352,14 @@ def _first_revolute(ring: Ring) -> int | None:
 
 
 def _normal(gaps: list[Matrix], start: int, end: int) -> Matrix:
-    """Return the axis of joint `start` in the frame of joint `end`, with zero joints between."""
+    """Return the axis (3,) of joint `start` in the frame of joint `end`, with joints at zero."""
     normal, n = _Z, len(gaps)
     for k in range(start + 1, end + 1 if end > start else end + n + 1):
         normal = gaps[k % n][:3, :3].T @ normal
     return normal
 
 
-def _fits(motion: Motion, normal: Matrix) -> bool:
+def _fits_plane(motion: Motion, normal: Matrix) -> bool:
     """Whether a joint can move in a plane with this normal (3,) in the joint frame."""
     if motion is Motion.SPHERICAL:
         return True
@@ -323,7 +400,12 @@ class Sample:
 
 
 def closure_of(ring: Ring, x: SX) -> SX:
-    """Return the error (12, 1) [1 or m] of X_1 J_1 .. X_n J_n = 1 at positions x (n, 1)."""
+    """Return the closure error (12, 1) of a loop: rotation matrix minus identity, then position.
+
+    Args:
+        ring: loop chain of n joints.
+        x: (n, 1) positions of the joints [rad or m].
+    """
     T = transforms(ring, x)[-1]
     return SX(casadi.densify(casadi.vertcat(casadi.vec(T.R - SX.eye(3)), T.p)))
 
@@ -352,7 +434,7 @@ def closed_samples(ring: Ring, given: SX, p: SX) -> list[Sample]:
         start = np.where(
             fixed, rng.uniform(*PARAMETERS, fixed.size), rng.uniform(*_POSITIONS, fixed.size)
         )
-        closed = _closed(function, start, fixed)
+        closed = _gauss_newton(function, start, fixed)
         if closed is not None:
             J = np.array(function(closed)[1])[:, :n]
             samples.append(Sample(closed[:n], closed[n:], rank(J, _LOOSE)))
@@ -362,8 +444,13 @@ def closed_samples(ring: Ring, given: SX, p: SX) -> list[Sample]:
     return samples
 
 
-def _closed(function: Function, start: Vector, fixed: NDArray[np.bool_]) -> Vector | None:
-    """Return a closed configuration from `start` with fixed positions kept; None if not found."""
+def _gauss_newton(function: Function, start: Vector, fixed: NDArray[np.bool_]) -> Vector | None:
+    """Return a closed configuration near `start` by Gauss-Newton; None if it does not converge.
+
+    Elements of the mask `fixed` are kept.
+
+    `function` maps all positions to the closure error and its Jacobian.
+    """
 
     def residual(free: Vector) -> tuple[Vector, Vector]:
         whole = start.copy()

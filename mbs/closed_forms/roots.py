@@ -59,7 +59,14 @@ class Roots:
 
 
 def positions(joints: Sequence[ChainJoint], values: Sequence[SX]) -> Positions:
-    """Return positions by index in q from positions along the loop, without spherical joints."""
+    """Return a dict from index in q to position, for joints along a loop.
+
+    Spherical joints and joints without index are left out.
+
+    Args:
+        joints: joints of the loop.
+        values: position of each joint in the direction of the loop.
+    """
     return {
         joint.index: joint.sign * value
         for joint, value in zip(joints, values, strict=True)
@@ -68,7 +75,11 @@ def positions(joints: Sequence[ChainJoint], values: Sequence[SX]) -> Positions:
 
 
 def signed(joint: ChainJoint) -> tuple[tuple[str, int], ...]:
-    """Return the two labels of a joint with two roots, each with its sign along the loop."""
+    """Return the two labels of a joint with two roots, each with its sign along the loop.
+
+    Args:
+        joint: joint whose two roots are distinguished.
+    """
     return tuple((f"{joint.name}:{label}", sign * joint.sign) for label, sign in _SIGNS)
 
 
@@ -104,9 +115,15 @@ class Angle:
 
 
 def root_angle(X: SX, Y: SX, Z: SX, sign: int) -> Angle:
-    """Return the root of X cos t + Y sin t = Z on one side (sign) of the direction (X, Y).
+    """Return a root of X cos t + Y sin t = Z as an angle.
 
     Source: Khalil & Creusot 1997, section 3.3, equation of type 2.
+
+    Args:
+        X: factor of cos t.
+        Y: factor of sin t.
+        Z: right side.
+        sign: side of the direction (X, Y) on which the root is: +1 at a positive angle from it.
     """
     size = X * X + Y * Y
     W = sign * casadi.sqrt(size - Z * Z)
@@ -114,26 +131,48 @@ def root_angle(X: SX, Y: SX, Z: SX, sign: int) -> Angle:
 
 
 def angle_onto(a: SX, b: SX) -> Angle:
-    """Return the rotation of vector a (2, 1) onto vector b (2, 1) of the same length."""
+    """Return the angle of the rotation of a plane vector onto another vector of the same length.
+
+    Args:
+        a: (2, 1) vector before the rotation.
+        b: (2, 1) vector after the rotation.
+    """
     fixed = a if a.is_constant() else b
     return Angle(a[0] * b[0] + a[1] * b[1], across(a, b), fixed[0] * fixed[0] + fixed[1] * fixed[1])
 
 
 def across(a: SX, b: SX) -> SX:
-    """Return the vector product (scalar) of two vectors of the plane."""
+    """Return the scalar cross product a_x b_y - a_y b_x of two plane vectors.
+
+    Args:
+        a: (2, 1) first vector.
+        b: (2, 1) second vector.
+    """
     return a[0] * b[1] - a[1] * b[0]
 
 
 def square(a: SX) -> SX:
-    """Return the square of the length of a vector."""
+    """Return the squared length of a vector.
+
+    Args:
+        a: (n, 1) vector.
+    """
     return SX(casadi.sumsqr(a))
 
 
 def in_plane(matrix: SX) -> SX:
-    """Return the x, y part of a rotation matrix or of a vector."""
+    """Return the x, y part of a rotation matrix (2, 2) or of a vector (2, 1).
+
+    Args:
+        matrix: (3, 3) rotation matrix, or (3, 1) vector.
+    """
     return matrix[0:2, 0:2] if matrix.shape[1] > 1 else matrix[0:2]
 
 
 def last_angle(before: SX) -> SX:
-    """Return the rotation about z [rad] that is inverse to `before`, of which row 1 is used."""
+    """Return the angle [rad] about z whose rotation is inverse to a given rotation.
+
+    Args:
+        before: rotation about z, (2, 2), of which only the first row is used.
+    """
     return SX(casadi.atan2(before[0, 1], before[0, 0]))

@@ -50,7 +50,13 @@ class Problem:
         return len(self.ring.joints)
 
     def at_samples(self, values: SX) -> list[Matrix]:
-        """Return an expression of x and given at every sample, with further angles zero."""
+        """Return the value of an expression of x and given at every sample.
+
+        Further angles, which are not joint positions, are zero.
+
+        Args:
+            values: expression.
+        """
         function = Function("values", [self.x, self.given], [values])
         rest = np.zeros(self.x.numel() - self.size)
         return [
@@ -58,7 +64,11 @@ class Problem:
         ]
 
     def always_zero(self, values: SX) -> bool:
-        """Whether an expression of x and given is zero at all closed configurations (samples)."""
+        """Whether all elements of an expression of x and given are zero at all samples.
+
+        Args:
+            values: expression.
+        """
         return all(bool(np.all(np.abs(sample) < ZERO)) for sample in self.at_samples(values))
 
 
@@ -132,7 +142,7 @@ def step(
 
 
 def _name(problem: Problem, index: int) -> str:
-    """Return the name of the joint with this index in x, or of its symbol."""
+    """Return the name of the joint with this index in x, else the name of its symbol."""
     names = {joint.index: joint.name for joint in problem.ring.joints}
     return names.get(index, str(problem.x[index]))
 
@@ -183,7 +193,7 @@ class StepSequence:
         return int(2 ** len(self.signs))
 
     def choice(self, branch: int) -> tuple[int, ...]:
-        """Return the signs, +1 or -1, of a branch."""
+        """Return the signs, +1 or -1, of branch b as a tuple in the order of `signs`."""
         count = len(self.signs)
         return tuple(-1 if branch >> (count - 1 - k) & 1 else 1 for k in range(count))
 
@@ -193,36 +203,39 @@ class StepSequence:
         return " ".join(f"{name}:{'+' if sign > 0 else '-'}" for name, sign in signs)
 
     def leaf(self, given: SX, s: SX) -> Leaf:
-        """Return the configuration for signs s (number of signs, 1), given as expressions."""
-        leaf, first = self._start(), 0
+        """Return the configuration for known quantities `given` and a vector s of all signs."""
+        leaf, first = self._empty_leaf(), 0
         for step in self.steps:
             chosen = s[first : first + len(step.signs)]
-            leaf, first = _take(leaf, step, given, chosen), first + len(step.signs)
-        return self._crop(leaf)
+            leaf, first = _after_step(leaf, step, given, chosen), first + len(step.signs)
+        return self._without_sums(leaf)
 
     def leaves(self, given: SX) -> list[Leaf]:
-        """Return the configurations of all branches in order, with common steps computed once."""
-        leaves = [self._start()]
+        """Return the configurations of all branches in order, with common steps computed once.
+
+        `given` (m, 1) are the known quantities.
+        """
+        leaves = [self._empty_leaf()]
         for step in self.steps:
             choices = list(itertools.product((1, -1), repeat=len(step.signs)))
             leaves = [
-                _take(leaf, step, given, SX(casadi.DM(choice)))
+                _after_step(leaf, step, given, SX(casadi.DM(choice)))
                 for leaf in leaves
                 for choice in choices
             ]
-        return [self._crop(leaf) for leaf in leaves]
+        return [self._without_sums(leaf) for leaf in leaves]
 
-    def _start(self) -> Leaf:
-        """Return the empty configuration from which the steps start."""
+    def _empty_leaf(self) -> Leaf:
+        """Return the empty configuration before the first step."""
         return Leaf(SX(2 * self.size, 1), SX(0, 1), SX(0, 1), {})
 
-    def _crop(self, leaf: Leaf) -> Leaf:
-        """Return a configuration without the indices reserved for sums of joints."""
+    def _without_sums(self, leaf: Leaf) -> Leaf:
+        """Return the configuration `leaf` without the positions that are sums of joint angles."""
         return Leaf(leaf.x[: self.size], leaf.real, leaf.regular, leaf.coefficients)
 
 
-def _take(leaf: Leaf, step: SequenceStep, given: SX, s: SX) -> Leaf:
-    """Return the configuration after a further step."""
+def _after_step(leaf: Leaf, step: SequenceStep, given: SX, s: SX) -> Leaf:
+    """Return the configuration after a further step with signs s."""
     values, real, regular, coefficients = step.function(leaf.x, given, s)
     x = SX(leaf.x)
     x[list(step.indices)] = values
@@ -276,12 +289,24 @@ def cosine_root(X: SX, Y: SX, Z: SX, sign: SX, scale: SX | float = 1.0) -> Root:
 
 
 def angle_of(s: SX, c: SX, scale: SX | float = 1.0) -> Root:
-    """Return the angle whose sine and cosine are s and c, up to one positive factor."""
+    """Return the angle whose sine and cosine are s and c times one positive factor.
+
+    Args:
+        s: sine times the factor.
+        c: cosine times the factor.
+        scale: typical size of s and c.
+    """
     return Root(SX(casadi.atan2(s, c)), SX(1), SX((s * s + c * c) / (scale * scale)))
 
 
 def square_root(square: SX, sign: SX, scale: SX | float = 1.0) -> Root:
-    """Return the root of r^2 = square with a given sign; scale is the typical size of r."""
+    """Return the root of r^2 = square with a given sign.
+
+    Args:
+        square: square of the root.
+        sign: +1 or -1.
+        scale: typical size of r.
+    """
     value = sign * casadi.sqrt(casadi.fmax(square, NONZERO))
     return Root(SX(value), SX(square / (scale * scale)), SX(1))
 
@@ -345,7 +370,7 @@ def trigonometric_quartic(a: SX, signs: SX, scale: SX | float = 1.0) -> Root:
     size = casadi.sumsqr(a[:4])
     b = a / casadi.sqrt(casadi.sumsqr(a) + TINY_SQUARE)
     A = _symmetric((b[0] + b[4] / 3, b[1], b[2] / 2), (b[4] / 3 - b[0], b[3] / 2), 2 * b[4] / 3)
-    line, other, split = _line(A, _CIRCLE, signs[0])
+    line, other, split = _conic_line(A, _CIRCLE, signs[0])
     X, Y, Z = line[0], line[1], -line[2]
     square = X * X + Y * Y
     radicand = square - Z * Z
@@ -383,7 +408,7 @@ def real_quartic(
     size = casadi.sumsqr(scaled[:4])
     b = scaled / casadi.sqrt(casadi.sumsqr(scaled) + TINY_SQUARE)
     A = _symmetric((b[0], b[1] / 2, b[2] / 6), (2 * b[2] / 3, b[3] / 2), b[4])
-    line, other, split = _line(A, _PARABOLA, signs[0])
+    line, other, split = _conic_line(A, _PARABOLA, signs[0])
     radicand = line[1] * line[1] - 4 * line[0] * line[2]
     foot = (
         other[0] * (line[1] * line[1] - 2 * line[0] * line[2])
@@ -391,7 +416,7 @@ def real_quartic(
         + 2 * other[2] * line[0] * line[0]
     )
     sign = -signs[1] * _minus_sign(foot)
-    r = _quadratic(line, sign * casadi.sqrt(casadi.fmax(radicand, TINY_SQUARE)))
+    r = _quadratic_root(line, sign * casadi.sqrt(casadi.fmax(radicand, TINY_SQUARE)))
     for _ in range(_STEPS):
         r = r + _newton(*_quartic(b, r), _MOST_STEP * casadi.sqrt(1 + r * r))
     r = casadi.fmax(casadi.fmin(r, _FAR), -_FAR)
@@ -402,12 +427,15 @@ def real_quartic(
 
 
 def _symmetric(row: tuple[SX, SX, SX], second: tuple[SX, SX], last: SX) -> SX:
-    """Return the symmetric matrix (3, 3) [[a, b, c], [b, d, e], [c, e, last]]."""
+    """Return the symmetric matrix (3, 3) [[a, b, c], [b, d, e], [c, e, last]].
+
+    `row` is (a, b, c), `second` is (d, e).
+    """
     (a, b, c), (d, e) = row, second
     return casadi.reshape(casadi.vertcat(a, b, c, b, d, e, c, e, last), 3, 3)
 
 
-def _line(A: SX, curve: _Curve, sign: SX) -> tuple[SX, SX, SX]:
+def _conic_line(A: SX, curve: _Curve, sign: SX) -> tuple[SX, SX, SX]:
     """Return one line of the degenerate conic of A and `curve`, the other line, and the radicand.
 
     Args:
@@ -419,22 +447,22 @@ def _line(A: SX, curve: _Curve, sign: SX) -> tuple[SX, SX, SX]:
     M = _degenerate(A, curve)
     adjugate = _adjugate(M)
     sizes = [casadi.fabs(adjugate[k, k]) for k in range(3)]
-    column = _largest(sizes, [adjugate[:, k] for k in range(3)])
-    minor = -_largest(sizes, [adjugate[k, k] for k in range(3)])
+    column = _of_largest(sizes, [adjugate[:, k] for k in range(3)])
+    minor = -_of_largest(sizes, [adjugate[k, k] for k in range(3)])
     root = casadi.sqrt(casadi.fmax(minor, 0) + TINY_SQUARE)
     p = -column * root / (casadi.fabs(minor) + TINY_SQUARE)
     side = p[0] * curve.side[0] + p[1] * curve.side[1] + p[2] * curve.side[2]
     p = -sign * _minus_sign(side) * p
     N = M - casadi.skew(p)
     sums = [casadi.sumsqr(N[:, k]) for k in range(3)]
-    line = _largest(sums, [N[:, k] for k in range(3)])
+    line = _of_largest(sums, [N[:, k] for k in range(3)])
     weights = [casadi.fabs(line[k]) for k in range(3)]
-    other = _largest(weights, [N[k, :].T * -_minus_sign(line[k]) for k in range(3)])
+    other = _of_largest(weights, [N[k, :].T * -_minus_sign(line[k]) for k in range(3)])
     return SX(line), SX(other), SX(minor / (casadi.sumsqr(M) + TINY_SQUARE))
 
 
 def _degenerate(A: SX, curve: _Curve) -> SX:
-    """Return A plus the multiple of the curve that makes a pair of lines, real if possible."""
+    """Return A (3, 3) plus the multiple of the curve that gives two lines, real if possible."""
     adjugate = _adjugate(A)
     linear = casadi.sum1(casadi.sum2(adjugate * SX(curve.C))) / curve.determinant
     constant = casadi.dot(A[:, 0], adjugate[:, 0]) / curve.determinant
@@ -463,14 +491,14 @@ def _outer_roots(c: SX, d: SX) -> list[SX]:
 
 
 def _adjugate(M: SX) -> SX:
-    """Return the adjugate (3, 3) of a symmetric matrix."""
+    """Return the adjugate (3, 3) of a symmetric matrix M (3, 3)."""
     a, b, c, d, e, f = M[0, 0], M[0, 1], M[0, 2], M[1, 1], M[1, 2], M[2, 2]
     off = (c * e - b * f, b * e - c * d, b * c - a * e)
     return _symmetric((d * f - e * e, off[0], off[1]), (a * f - c * c, off[2]), a * d - b * b)
 
 
-def _largest(sizes: list[SX], values: list[SX]) -> SX:
-    """Return the value that belongs to the largest of three sizes."""
+def _of_largest(sizes: list[SX], values: list[SX]) -> SX:
+    """Return the element (1, 1) of three `values` that belongs to the largest of three `sizes`."""
     late = casadi.if_else(sizes[2] > sizes[1], values[2], values[1])
     first = casadi.logic_and(sizes[0] >= sizes[1], sizes[0] >= sizes[2])
     return SX(casadi.if_else(first, values[0], late))
@@ -482,14 +510,14 @@ def _minus_sign(value: SX) -> SX:
 
 
 def _newton(value: SX, slope: SX, most: SX | float) -> SX:
-    """Return a Newton step that is not larger than half of `most`."""
+    """Return Newton's step for a value and its slope, bounded by half of `most`."""
     # for slopes below 1e-15, which are rounding, the step tends to zero instead of infinity
     step = -value * slope / (slope * slope + 1e-30)
     return SX(step / (1 + (step / most) ** 2))
 
 
 def _trigonometric(b: SX, t: SX) -> tuple[SX, SX]:
-    """Return the trigonometric polynomial and its slope."""
+    """Return the polynomial of `trigonometric_quartic` with coefficients b at t, and its slope."""
     c, s = casadi.cos(t), casadi.sin(t)
     c2, s2 = c * c - s * s, 2 * s * c
     value = b[0] * c2 + b[1] * s2 + b[2] * c + b[3] * s + b[4]
@@ -497,15 +525,18 @@ def _trigonometric(b: SX, t: SX) -> tuple[SX, SX]:
 
 
 def _quartic(b: SX, r: SX) -> tuple[SX, SX]:
-    """Return the polynomial and its slope, both divided by (1 + r^2)^2."""
+    """Return (value, slope) of the quartic with coefficients b (5, 1) at r, divided by (1 + r^2)^2.
+
+    The slope is the derivative of the quartic by r.
+    """
     value = (((b[0] * r + b[1]) * r + b[2]) * r + b[3]) * r + b[4]
     slope = ((4 * b[0] * r + 3 * b[1]) * r + 2 * b[2]) * r + b[3]
     size = (1 + r * r) ** 2
     return value / size, slope / size
 
 
-def _quadratic(line: SX, root: SX) -> SX:
-    """Return (-b + root) / (2 a) for a r^2 + b r + c, without cancellation and bounded."""
+def _quadratic_root(line: SX, root: SX) -> SX:
+    """Return (-b + root) / (2 a) for `line` = (a, b, c), without cancellation and bounded."""
     a, b, c = line[0], line[1], line[2]
     up, down = root - b, -b - root
     steady = b * root <= 0

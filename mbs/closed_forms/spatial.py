@@ -48,10 +48,12 @@ from mbs.spatial import Pose, cross, quaternion_rotation, vector
 
 
 def aim(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """Return two branches that aim a link between two centres; None unless they contain all joints.
+    """Return the branches of two joints that aim a link at a centre of the remaining joints.
+
+    None unless the loop consists of a centre of two revolute joints and another centre.
 
     Args:
-        ring: loop chain with a centre of two revolute joints.
+        ring: loop chain.
         q: symbols of positions.
         p: symbols of parameters.
     """
@@ -106,7 +108,13 @@ def _aim_root(ring: Ring, one: Centre, other: Centre, sign: int) -> Positions:
 
 
 def spherical(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """Return the quaternion of a spherical joint of the tree; None unless it alone is unknown."""
+    """Return the quaternion of a spherical joint of the tree; None unless it alone is unknown.
+
+    Args:
+        ring: loop chain.
+        q: symbols of positions.
+        p: symbols of parameters.
+    """
     joint = ring.joints[0]
     if len(ring.joints) != 1 or joint.motion is not Motion.SPHERICAL or joint.index is None:
         return None
@@ -116,7 +124,11 @@ def spherical(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def unit_quaternion(R: SX) -> SX:
-    """Return the unit quaternion w, x, y, z (4, 1) of a rotation matrix, with w >= 0."""
+    """Return the unit quaternion w, x, y, z (4, 1) of a rotation, with w >= 0.
+
+    Args:
+        R: (3, 3) rotation matrix.
+    """
     a, b, c = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
     d, e, f = R[1, 2] + R[2, 1], R[0, 2] + R[2, 0], R[0, 1] + R[1, 0]
     trace = casadi.trace(R)
@@ -148,7 +160,9 @@ _Z = (0.0, 0.0, 1.0)
 
 
 def confine(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """Return the rotation that moves a spherical centre into the plane of two joints, or None.
+    """Return the rotation that moves a spherical centre into the plane of two joints.
+
+    None for loops without such joints.
 
     Args:
         ring: loop chain with one spherical joint and three other unknown joints.
@@ -163,13 +177,21 @@ def confine(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     for path in (begun, begun.reversed().rotated(1)):
         if path.joints[0].is_rotational:
             normal = _normal(path, q, p)
-            if normal is not None and not _is_across(path, normal, q, p):
+            if normal is None:
+                continue
+            across = in_plane(path.gaps[1].pose.R @ normal)  # zero: joint 1 is parallel to it
+            if not always_zero(across, q, p):
                 return _confine_branches(path, normal)
     return None
 
 
 def _normal(ring: Ring, q: SX, p: SX) -> SX | None:
-    """Return the normal of the plane of motion of joints 2 and 3, in the frame before joint 2."""
+    """Return the normal (3, 1) of the plane of motion of joints 2 and 3, before joint 2.
+
+    None if they do not keep a point in a plane.
+
+    q and p are the symbols of positions and parameters.
+    """
     second, third = (joint.motion is Motion.PRISMATIC for joint in ring.joints[1:3])
     between = ring.gaps[2].pose
     axis = between.R[:, 2]
@@ -181,13 +203,8 @@ def _normal(ring: Ring, q: SX, p: SX) -> SX | None:
     return vector(_Z) if parallel(between, q, p) else None
 
 
-def _is_across(ring: Ring, normal: SX, q: SX, p: SX) -> bool:
-    """Whether the axis of joint 1 is parallel to the normal, so that it cannot reach the plane."""
-    return always_zero(in_plane(ring.gaps[1].pose.R @ normal), q, p)
-
-
 def _confine_branches(ring: Ring, normal: SX) -> LoopBranches:
-    """Return both angles of joint 1 that move the spherical centre into the other joints' plane."""
+    """Return both angles of joint 1 that move the spherical centre into the plane with `normal`."""
     X1, X2, X3, X4 = (gap.pose for gap in ring.gaps)
     joint, target = ring.joints[0], X1.inverse().p
     m = X2.R @ normal
@@ -207,12 +224,15 @@ def _confine_branches(ring: Ring, normal: SX) -> LoopBranches:
 def coupled_position(
     coupling: CoordinateCoupling, known: Container[int], q: SX
 ) -> LoopBranches | str:
-    """Return the unknown coordinate of a coupling, or text on why it cannot be solved.
+    """Return the unknown coordinate of a coupling of coordinates.
 
     Args:
         coupling: coupling with all coordinates but one known.
         known: indices in q of known positions.
         q: (nq, 1) symbols of positions.
+
+    Returns:
+        Single branch, or text that describes why the coordinate cannot be solved.
     """
     terms = coupling.coefficients
     unknown = [number for number in coupling.coordinates if number not in known]
@@ -257,18 +277,24 @@ class RigidLink:
 
 
 def spans(ring: Ring, q: SX, p: SX) -> Iterator[RigidLink]:
-    """Yield each rigid link of a loop between two centres."""
+    """Yield each rigid link of a loop between two centres.
+
+    Args:
+        ring: loop chain.
+        q: symbols of positions.
+        p: symbols of parameters.
+    """
     n = len(ring.joints)
     found = centres(ring, q, p)
     for one in found:
         for other in found:
             apart = not set(one.joints(n)) & set(other.joints(n))
             if apart and (one.first + one.count - other.first) % n == 0:
-                yield _span(ring.rotated(one.first), one, other)
+                yield _rigid_link(ring.rotated(one.first), one, other)
 
 
-def _span(begun: Ring, one: Centre, other: Centre) -> RigidLink:
-    """Return the span from the centre `one`, at which the loop begins, to the next one, `other`."""
+def _rigid_link(begun: Ring, one: Centre, other: Centre) -> RigidLink:
+    """Return rigid link from the centre `one`, at which the loop begins, to the next, `other`."""
     link = begun.gaps[one.count].pose
     after = one.count + other.count
     return RigidLink(
@@ -280,18 +306,27 @@ def _span(begun: Ring, one: Centre, other: Centre) -> RigidLink:
 
 
 def at_distance(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """Return the branches of a single joint outside a link between two centres, or None."""
+    """Return the branches of the single joint outside a rigid link between two centres, or None.
+
+    Args:
+        ring: loop chain.
+        q: symbols of positions.
+        p: symbols of parameters.
+    """
     for span in spans(ring, q, p):
         if len(span.chain.joints) == 1:
-            m, d = _ends(span)
+            m, d = _link_ends(span)
             idle = any(always_zero(in_plane(end), q, p) for end in (m, d))
             if not (idle and span.chain.joints[0].is_rotational):
                 return _at_distance(span.chain.joints[0], m, d, span.squared)
     return None
 
 
-def _ends(span: RigidLink) -> tuple[SX, SX]:
-    """Return the link's end in the frame before the joint, negated, and its start after it."""
+def _link_ends(span: RigidLink) -> tuple[SX, SX]:
+    """Return both ends (3, 1) of rigid link `span` relative to the only other joint of its loop.
+
+    These are the end in the frame before the joint, negated, and the start in the frame after it.
+    """
     before, after = (gap.pose for gap in span.chain.gaps)
     back = before.inverse()
     return -(back.p + back.R @ span.target), after.p + after.R @ span.start
@@ -323,7 +358,13 @@ def _at_distance(joint: ChainJoint, m: SX, d: SX, squared: SX) -> LoopBranches:
 
 
 def free_body(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """Return the pose of a free body; None unless it is the only unknown joint."""
+    """Return the pose of a free body; None unless it is the only unknown joint.
+
+    Args:
+        ring: loop chain.
+        q: symbols of positions.
+        p: symbols of parameters.
+    """
     joint = ring.joints[0]
     if len(ring.joints) != 1 or joint.motion is not Motion.FREE or joint.index is None:
         return None
@@ -382,7 +423,13 @@ def _orientations_root(ring: Ring, sign: int) -> Positions:
 
 
 def orientation(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """Return the revolute joints that orientations alone determine; None if there are none."""
+    """Return the revolute joints that orientations alone determine; None if there are none.
+
+    Args:
+        ring: loop chain.
+        q: symbols of positions.
+        p: symbols of parameters.
+    """
     if any(joint.motion not in (Motion.REVOLUTE, Motion.PRISMATIC) for joint in ring.joints):
         return None
     revolute = _revolute_alone(ring)
@@ -409,7 +456,12 @@ def _revolute_alone(ring: Ring) -> Ring:
 
 
 def _directions(ring: Ring, q: SX, p: SX) -> tuple[Ring, frozenset[str]]:
-    """Return the loop with one joint per direction, and names of joints that represent several."""
+    """Return the loop with one joint for each set of parallel joints, and names of such joints.
+
+    The names are those of joints that represent several joints.
+
+    q and p are the symbols of positions and parameters.
+    """
     shared, k = set[str](), 0
     while k < len(ring.joints) > 1:
         if parallel(ring.gaps[k].pose, q, p):
@@ -422,14 +474,20 @@ def _directions(ring: Ring, q: SX, p: SX) -> tuple[Ring, frozenset[str]]:
 
 
 def _is_oriented(ring: Ring, revolute: Ring, q: SX, p: SX) -> bool:
-    """Whether three rotations follow from orientations: free translations, or intersecting axes."""
+    """Whether the orientations of three revolute joints can be solved before all other joints.
+
+    Translations must be free or the axes intersect. `revolute` is the loop without other joints.
+    """
     if len(ring.joints) == len(revolute.joints):
         return any(centre.count == 3 for centre in centres(ring, q, p))
     return len(ring.joints) == len(revolute.joints) + 3
 
 
 def _two_orientations(ring: Ring, shared: frozenset[str]) -> LoopBranches:
-    """Return the positions of two revolute joints that close the orientations of a loop."""
+    """Return the positions of two revolute joints that close the orientations of a loop.
+
+    Joints with names in `shared` are left out.
+    """
     values: dict[int, SX] = {}
     for begun in (ring, ring.rotated(1)):
         joint, (R1, R2) = begun.joints[0], (gap.pose.R for gap in begun.gaps)
@@ -450,7 +508,13 @@ _MOST = 3
 
 
 def prismatic(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """Return the unique displacements that close a loop; None if they depend on a rotation."""
+    """Return the unique displacements that close a loop; None if they depend on a rotation.
+
+    Args:
+        ring: loop chain.
+        q: symbols of positions.
+        p: symbols of parameters.
+    """
     number = sum(joint.motion is Motion.PRISMATIC for joint in ring.joints)
     if not 1 <= number <= _MOST:
         return None
@@ -464,7 +528,7 @@ def prismatic(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def _prismatic_branches(ring: Ring, centre: Centre) -> LoopBranches:
-    """Return the prismatic joints of a loop that starts at a centre and ends at it."""
+    """Return the displacements of the prismatic joints of a loop that starts at a centre."""
     joints = ring.joints[centre.count :]
     poses = frames_at_zero(ring.gaps[centre.count :], Pose.translation(-centre.after))
     axes, pose = [pose.R[:, 2] for pose in poses], poses[-1]
@@ -475,7 +539,7 @@ def _prismatic_branches(ring: Ring, centre: Centre) -> LoopBranches:
 
 
 def _combination(u: Sequence[SX], e: SX) -> list[SX]:
-    """Return the coefficients of one to three vectors u whose combination is e."""
+    """Return the factors of one to three vectors u (3, 1) whose combination is e (3, 1)."""
     if len(u) == 1:
         return [casadi.dot(u[0], e) / casadi.sumsqr(u[0])]
     if len(u) == 2:
@@ -495,7 +559,9 @@ def _combination(u: Sequence[SX], e: SX) -> list[SX]:
 
 
 def spin(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """Return the quaternion of a rod from its spin; None if more than its two joints is unknown.
+    """Return the quaternion of a rod at a known spin about its line.
+
+    None unless exactly the two spherical joints of a rod are unknown.
 
     Args:
         ring: loop chain.
@@ -511,32 +577,35 @@ def spin(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
 
 
 def _rod_branches(ring: Ring, joint: ChainJoint, q: SX) -> LoopBranches:
-    """Return the branch of a spherical joint of a rod, for a known spin about the rod's line."""
+    """Return the branch of a spherical joint of a rod, for a known spin about the rod.
+
+    `joint` is the spherical joint; the spin is an element of the positions q.
+    """
     before, after = ring.gaps[0].pose.inverse().p, ring.gaps[1].pose.p
     u, w = (after, before) if joint.sign > 0 else (before, after)
     u, w = u / casadi.norm_2(u), w / casadi.norm_2(w)
     assert joint.spin is not None
     assert joint.index is not None
     rest = SX(casadi.DM(list(joint.spin.rest)))
-    shortest = _product(_shortest_rotation(quaternion_rotation(rest) @ u, w), rest)
+    shortest = _quaternion_product(_shortest_rotation(quaternion_rotation(rest) @ u, w), rest)
     half = q[joint.spin.index] / 2
-    rotated = _product(shortest, casadi.vertcat(casadi.cos(half), casadi.sin(half) * u))
+    rotated = _quaternion_product(shortest, casadi.vertcat(casadi.cos(half), casadi.sin(half) * u))
     rotated = casadi.if_else(rotated[0] < 0, -rotated, rotated)
     path = {joint.index + k: rotated[k] for k in range(4)}
     given = q[joint.index : joint.index + 4]
-    left = _product(casadi.vertcat(shortest[0], -shortest[1:4]), given)
+    left = _quaternion_product(casadi.vertcat(shortest[0], -shortest[1:4]), given)
     angle = 2 * casadi.atan2(casadi.dot(u, left[1:4]), left[0])
     return LoopBranches({"": path}, RodSpin(joint.spin.index, SX(angle)))
 
 
 def _shortest_rotation(a: SX, b: SX) -> SX:
-    """Return the quaternion that rotates the unit vector a onto b about their common normal."""
+    """Return quaternion (4, 1) that rotates the unit vector a onto b about their common normal."""
     whole = casadi.vertcat(1 + casadi.dot(a, b), cross(a, b))
     return SX(whole / casadi.norm_2(whole))
 
 
-def _product(a: SX, b: SX) -> SX:
-    """Return the product of two quaternions w, x, y, z."""
+def _quaternion_product(a: SX, b: SX) -> SX:
+    """Return the Hamilton product a b (4, 1) of two quaternions, with the order w, x, y, z."""
     vector = a[0] * b[1:4] + b[0] * a[1:4] + cross(a[1:4], b[1:4])
     return casadi.vertcat(a[0] * b[0] - casadi.dot(a[1:4], b[1:4]), vector)
 
@@ -568,7 +637,13 @@ class _Sphere:
 
 
 def prismatic_indices(span: RigidLink) -> frozenset[int] | None:
-    """Return indices in q of the two or three prismatic joints of a span; None for other joints."""
+    """Return the indices in q of the two or three joints outside a rigid link.
+
+    None if one of these joints is not prismatic, or for another number of joints.
+
+    Args:
+        span: rigid link with its loop.
+    """
     if any(joint.motion is not Motion.PRISMATIC for joint in span.chain.joints):
         return None
     indices = frozenset(joint.index for joint in span.chain.joints if joint.index is not None)
@@ -582,6 +657,9 @@ def independent_links(spans: Mapping[int, RigidLink], q: SX, p: SX) -> list[int]
         spans: links whose loops have the same prismatic joints, by loop index.
         q: symbols of positions.
         p: symbols of parameters.
+
+    Returns:
+        Loop indices, as many as prismatic joints.
     """
     indices = sorted(prismatic_indices(next(iter(spans.values()))) or ())
     found, centres = list[int](), list[SX]()
@@ -597,7 +675,10 @@ def independent_links(spans: Mapping[int, RigidLink], q: SX, p: SX) -> list[int]
 
 
 def _span_normal(a: Sequence[SX]) -> SX:
-    """Return an expression that is zero if one vector is zero or two vectors are parallel."""
+    """Return an expression that is zero if one vector is zero, or two vectors are parallel.
+
+    `a` contains one or two vectors (3, 1).
+    """
     return a[0] if len(a) == 1 else cross(a[0], a[1])
 
 
@@ -611,7 +692,7 @@ def point_on_links(name: str, spans: Sequence[RigidLink]) -> LoopBranches:
     indices = sorted(prismatic_indices(spans[0]) or ())
     spheres = [_sphere(span, indices) for span in spans]
     first = spheres[0]
-    base, along = _line(spheres)
+    base, along = _sphere_line(spheres)
     A, B = casadi.bilin(first.M, along, along), casadi.dot(along, first.M @ base + first.c)
     C = casadi.bilin(first.M, base, base) + 2 * casadi.dot(first.c, base) + first.k
     root = casadi.sqrt(B * B - A * C)
@@ -623,6 +704,7 @@ def point_on_links(name: str, spans: Sequence[RigidLink]) -> LoopBranches:
 
 
 def _sphere(span: RigidLink, indices: Sequence[int]) -> _Sphere:
+    """Return the equation of a rigid link in the displacements of the joints with these indices."""
     *poses, end = frames_at_zero(span.chain.gaps, Pose.translation(-span.target))
     axes = {
         joint.index: joint.sign * at.R[:, 2]
@@ -633,8 +715,8 @@ def _sphere(span: RigidLink, indices: Sequence[int]) -> _Sphere:
     return _Sphere(U.T @ U, U.T @ e, casadi.sumsqr(e) - span.squared)
 
 
-def _line(spheres: Sequence[_Sphere]) -> tuple[SX, SX]:
-    """Return a point and the direction of the line that contains the common points of spheres."""
+def _sphere_line(spheres: Sequence[_Sphere]) -> tuple[SX, SX]:
+    """Return a point and the direction of the line in which the planes of the spheres intersect."""
     first, *others = spheres
     a = [other.c - first.c for other in others]
     h = [(first.k - other.k) / 2 for other in others]
@@ -665,7 +747,13 @@ class _Axes:
 
 
 def bennett(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """Return the unique branch of Bennett's loop with one known joint; None for other loops."""
+    """Return the unique branch of Bennett's loop with one known joint; None for other loops.
+
+    Args:
+        ring: loop chain.
+        q: symbols of positions.
+        p: symbols of parameters.
+    """
     revolute = all(joint.motion is Motion.REVOLUTE for joint in ring.joints)
     if len(ring.joints) != 3 or not revolute:
         return None
@@ -673,7 +761,7 @@ def bennett(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
         begun = ring.rotated(first)
         known = begun.gaps[0].pivots
         if len(known) == 1 and not any(gap.pivots for gap in begun.gaps[1:]):
-            branches = _closing(begun, known[0], q, p)
+            branches = _closing_angles(begun, known[0], q, p)
             if len(branches) == 1:
                 return LoopBranches(
                     {"": positions(ring.rotated(first).joints, [t.value for t in branches[0]])}
@@ -681,8 +769,11 @@ def bennett(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
     return None
 
 
-def _closing(ring: Ring, known: Pose, q: SX, p: SX) -> list[list[Angle]]:
-    """Return the angles of each half rotation that closes the loop at all known positions."""
+def _closing_angles(ring: Ring, known: Pose, q: SX, p: SX) -> list[list[Angle]]:
+    """Return the angles of each half rotation that closes the loop at all known positions.
+
+    `known` is the pose of the known joint in the frame of its transform.
+    """
     axes = _Axes(vector(_Z), known.R[:, 2], ring.gaps[0].pose.R[:, 2])
     found = list[list[Angle]]()
     for side in (1, -1):
@@ -696,7 +787,11 @@ def _closing(ring: Ring, known: Pose, q: SX, p: SX) -> list[list[Angle]]:
 
 
 def _has_equal_twists(ring: Ring, axes: _Axes, side: int, q: SX, p: SX) -> bool:
-    """Whether the twists of the unknown links are equal to the twists of the opposite links."""
+    """Whether the twists of unknown links equal those of the opposite links, times `side` (+-1).
+
+    `axes` are the directions of the axes of the loop; q and p are the symbols of positions and
+    parameters.
+    """
     _, R2, R3 = (gap.pose.R for gap in ring.gaps)
     first = R2[2, 2] - side * casadi.dot(axes.before, axes.known)
     second = R3[2, 2] - side * casadi.dot(axes.after, axes.known)
@@ -704,7 +799,10 @@ def _has_equal_twists(ring: Ring, axes: _Axes, side: int, q: SX, p: SX) -> bool:
 
 
 def _angles(ring: Ring, axes: _Axes, swap: int, sense: int) -> list[Angle]:
-    """Return the angles for the half rotation that maps axis `after` to swap times `before`."""
+    """Return the angles for the half rotation that maps axis `after` to `swap` times `before`.
+
+    `swap` and `sense` are 1 or -1.
+    """
     R1, R2, R3 = (gap.pose.R for gap in ring.gaps)
     line = axes.after + swap * axes.before
     across = 2 * casadi.dot(line, axes.known) / casadi.sumsqr(line)
@@ -717,7 +815,10 @@ def _angles(ring: Ring, axes: _Axes, swap: int, sense: int) -> list[Angle]:
 
 
 def _closure_gap(ring: Ring, angles: list[Angle]) -> SX:
-    """Return the closure error of the loop (16, 1): pose around the loop minus the identity."""
+    """Return the closure error of the loop (16, 1): pose around the loop minus the identity.
+
+    `angles` are the angles of all joints of the loop.
+    """
     pose = Pose.identity()
     for gap, angle in zip(ring.gaps, angles, strict=True):
         pose = pose @ gap.pose @ _rotation(angle)
@@ -725,7 +826,7 @@ def _closure_gap(ring: Ring, angles: list[Angle]) -> SX:
 
 
 def _rotation(angle: Angle) -> Pose:
-    """Return the rotation about z by an angle with expressions."""
+    """Return the rotation about z by a symbolic angle."""
     c, s = casadi.cos(angle.value), casadi.sin(angle.value)
     rows = (casadi.horzcat(c, -s, 0), casadi.horzcat(s, c, 0), casadi.horzcat(SX(0), 0, 1))
     return Pose.rotation(casadi.vertcat(*rows))

@@ -26,7 +26,7 @@ _AXES = Pose.rotation(SX(DM([[1, 0, 0], [0, 0, -1], [0, 1, 0]])))
 
 
 def split(ring: Ring, q: SX, p: SX) -> LoopBranches | str:
-    """Return the branches of the revolute and prismatic joints of a loop, or text on the failure.
+    """Return the branches of the revolute and prismatic joints of a loop, by Paul's method.
 
     A spherical joint is replaced by three revolute joints, whose positions are not returned. The
     label of a branch has the signs of all steps with several roots, each named after its joint.
@@ -35,6 +35,9 @@ def split(ring: Ring, q: SX, p: SX) -> LoopBranches | str:
         ring: loop chain.
         q: symbols of positions, cut joints included.
         p: symbols of parameters.
+
+    Returns:
+        Branches, or text that describes why the method fails.
     """
     simple = _without_spherical(ring)
     if len(simple.joints) > _MOST:
@@ -48,7 +51,7 @@ def split(ring: Ring, q: SX, p: SX) -> LoopBranches | str:
         sequence = paul(problem)
     except NoClosedForm as error:
         return str(error)
-    return _root(simple, problem, sequence)
+    return _branches_of(simple, problem, sequence)
 
 
 def _without_spherical(ring: Ring) -> Ring:
@@ -66,7 +69,10 @@ def _without_spherical(ring: Ring) -> Ring:
 
 
 def _problem(ring: Ring, q: SX, p: SX) -> Problem | str:
-    """Return the loop with joint indices from zero, or why it does not determine its joints."""
+    """Return the loop as a problem with joint indices from zero.
+
+    Text on the reason instead, if the known quantities do not determine its joints.
+    """
     gaps = SX(casadi.vertcat(*(casadi.vec(gap.pose.matrix) for gap in ring.gaps)))
     symbols = {symbol.name() for symbol in casadi.symvar(gaps)}
     every = [*casadi.vertsplit(q), *casadi.vertsplit(p)]
@@ -83,19 +89,19 @@ def _problem(ring: Ring, q: SX, p: SX) -> Problem | str:
     return Problem(own, x, given, [(sample.x, sample.given) for sample in samples])
 
 
-def _root(ring: Ring, problem: Problem, sequence: StepSequence) -> LoopBranches:
-    """Return the branches of a loop from the steps of a solved sequence."""
+def _branches_of(ring: Ring, problem: Problem, sequence: StepSequence) -> LoopBranches:
+    """Return the branches of a loop from the sequence of steps that solves `problem`."""
     indices = {k: joint.index for k, joint in enumerate(ring.joints) if joint.index is not None}
-    needed = _up_to(sequence, set(indices))
+    needed = _first_steps(sequence, set(indices))
     branches = dict[str, dict[int, SX]]()
     for branch, leaf in enumerate(needed.leaves(problem.given)):
-        x = _where_real(leaf)
+        x = _nan_unless_real(leaf)
         branches[needed.label(branch)] = {index: SX(x[k]) for k, index in indices.items()}
     return LoopBranches(branches)
 
 
-def _up_to(sequence: StepSequence, target: set[int]) -> StepSequence:
-    """Return the first steps that are needed to solve the joints of the indices `target`."""
+def _first_steps(sequence: StepSequence, target: set[int]) -> StepSequence:
+    """Return the first steps of a sequence that solve the joints with indices `target`."""
     steps = list[SequenceStep]()
     for step in sequence.steps:
         if target:
@@ -104,8 +110,8 @@ def _up_to(sequence: StepSequence, target: set[int]) -> StepSequence:
     return replace(sequence, steps=tuple(steps))
 
 
-def _where_real(leaf: Leaf) -> SX:
-    """Return the positions, or NaN if a radicand is negative."""
+def _nan_unless_real(leaf: Leaf) -> SX:
+    """Return the positions (n, 1) of a branch; NaN if a radicand is negative."""
     real = leaf.real
     if real.numel() == 0:
         return leaf.x

@@ -40,7 +40,6 @@ COMPILERS = ("cc", "gcc", "clang")
 ZIG = (sys.executable, "-m", "ziglang", "cc", "-mcpu=baseline")
 """Command of the compiler in ziglang. Without -mcpu, it uses instructions of this processor only,
 which end a process on an older processor."""
-"""Command of the C compiler in the package ziglang."""
 
 
 class BuildError(RuntimeError):
@@ -48,7 +47,7 @@ class BuildError(RuntimeError):
 
 
 def source_sum() -> str:
-    """Return the hash of the C files and flags, which the library contains too."""
+    """Return the hash of the C files and flags. The built library contains it as text."""
     found = hashlib.sha256(" ".join(_FLAGS).encode())
     for file in sorted(SOURCE.glob("*.[ch]")):
         found.update(file.name.encode() + b"\0" + file.read_bytes())
@@ -56,7 +55,7 @@ def source_sum() -> str:
 
 
 def is_current() -> bool:
-    """Return whether the library is there and was built from the present C files."""
+    """Whether the library exists and was built from the present C files."""
     return LIBRARY.is_file() and source_sum().encode() in LIBRARY.read_bytes()
 
 
@@ -70,17 +69,17 @@ def installed_compiler() -> list[str] | None:
 
 
 def build(target: Path = LIBRARY, sources: Sequence[Path] | None = None) -> Path:
-    """Compile the C files into a library.
+    """Compile the C files into the run-time library.
 
     Args:
-        target: the library to write. It appears complete or not at all.
-        sources: the C files; all files of `SOURCE` if left out.
+        target: path of the library. It appears complete or not at all.
+        sources: C files; all files of `SOURCE` by default.
 
     Returns:
         the target.
 
     Raises:
-        BuildError: there is no compiler, or it reports an error.
+        BuildError: there is no compiler, Python.h is missing, or the compiler reports an error.
     """
     command = installed_compiler() or [*ZIG]
     include = Path(sysconfig.get_path("include"))
@@ -105,7 +104,7 @@ def build(target: Path = LIBRARY, sources: Sequence[Path] | None = None) -> Path
 
 
 def _run(command: list[str]) -> None:
-    """Run the compiler; a BuildError if it fails."""
+    """Run the compiler. Raise BuildError if it does not start or reports an error."""
     try:
         answer = subprocess.run(command, capture_output=True, text=True, errors="replace")
     except OSError as error:

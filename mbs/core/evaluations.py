@@ -20,14 +20,24 @@ _MOST = 4096
 
 @lru_cache(maxsize=_MOST)
 def code_address(library: ctypes.CDLL, name: str) -> int:
-    """Return the address of a function in a library; zero if the library has none of this name."""
+    """Return the address of a function in a library; 0 if the library has no function of this name.
+
+    Args:
+        library: library loaded by ctypes.
+        name: name of the C function.
+    """
     found = ctypes.cast(library[name], ctypes.c_void_p).value if hasattr(library, name) else None
     return found or 0
 
 
 @lru_cache(maxsize=_MOST)
 def work_sizes(library: ctypes.CDLL, name: str) -> tuple[int, ...]:
-    """Return the lengths of arg, res, iw and w that a function needs, by CasADi's convention."""
+    """Return the lengths of arg, res, iw and w that a function needs, by CasADi's convention.
+
+    Args:
+        library: library loaded by ctypes.
+        name: name of the C function, to which "_work" is appended.
+    """
     sizes = [ctypes.c_longlong() for _ in range(4)]
     library[f"{name}_work"](*map(ctypes.byref, sizes))
     return tuple(size.value for size in sizes)
@@ -39,7 +49,7 @@ def compiled_evaluation(function: Function, library: ctypes.CDLL) -> Callable[[]
     Each object has scratch memory of its own, and serves one algorithm at a time.
 
     Args:
-        function: the function, with all inputs and outputs.
+        function: CasADi Function, for names and numbers of inputs and outputs.
         library: its code, in the calling convention of CasADi.
     """
     name = function.name()
@@ -49,13 +59,13 @@ def compiled_evaluation(function: Function, library: ctypes.CDLL) -> Callable[[]
 
 
 def interpreted_evaluation(function: Function, examine: Callable[[BaseException], None]) -> Any:
-    """Return an object by which algorithms in C evaluate a function that CasADi interprets.
+    """Return an object with which algorithms of the run-time library evaluate a CasADi Function.
 
     Args:
-        function: the function. C passes the nonzeros of its inputs and outputs.
-        examine: function that is called with the Python error of an evaluation. It returns if
-            this error means that there is no value for these inputs, and raises an error if the
-            algorithm must end.
+        function: Function that CasADi interprets. C passes the nonzeros of its inputs and outputs.
+        examine: callable that receives the Python error of an evaluation. It returns if this error
+            means that there is no value for these inputs, and raises an error if the algorithm must
+            end.
     """
     bound: Any = function.buffer()
     buffer, call = bound
@@ -69,16 +79,22 @@ def interpreted_evaluation(function: Function, examine: Callable[[BaseException]
 
 
 def python_evaluation(call: Callable[[], None], inputs: Arrays, outputs: Arrays) -> Any:
-    """Return an object by which algorithms in C call Python. Its errors end the algorithm.
+    """Return an object with which algorithms of the run-time library call Python.
+
+    Errors of the call end the algorithm.
 
     Args:
-        call: reads the inputs and writes the outputs.
-        inputs: arrays, which must not be replaced.
-        outputs: arrays, which must not be replaced.
+        call: callable that reads the inputs and writes the outputs.
+        inputs: arrays for the inputs; the algorithm writes to them in place.
+        outputs: arrays for the outputs; the algorithm reads them in place.
     """
     return core_library().interpreted(call, reraise, None, inputs, outputs)
 
 
 def reraise(error: BaseException) -> None:
-    """Pass an error on: every error ends the algorithm."""
+    """Raise an error again, so that every error ends the algorithm.
+
+    Args:
+        error: error of an evaluation.
+    """
     raise error

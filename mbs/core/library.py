@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -29,10 +30,21 @@ def core_library() -> Any:
     return importlib.import_module("mbs.core._core")
 
 
+_INCLUDE = re.compile(r'^#include "(.+)"$', re.MULTILINE)
+
+
 def core_files(names: Iterable[str]) -> dict[str, str]:
-    """Return the text of C files and headers of the run-time library.
+    """Return the texts of C files and headers of the run-time library, by name.
 
     Args:
-        names: file names.
+        names: file names in `mbs/core/source`.
+
+    Returns:
+        dict from name to text: the named files, then further headers that they include.
     """
-    return {name: (SOURCE / name).read_text(encoding="utf-8") for name in names}
+    waiting, texts = list(names), dict[str, str]()
+    for name in waiting:  # the list grows
+        if name not in texts:
+            texts[name] = (SOURCE / name).read_text(encoding="utf-8")
+            waiting += _INCLUDE.findall(texts[name])
+    return texts

@@ -16,8 +16,8 @@ import numpy as np
 from casadi import DM, SX, Function
 
 from mbs.assembly import System
+from mbs.assembly.component_instances import ComponentInstance
 from mbs.assembly.khalil_frames import Cut
-from mbs.assembly.parts import ComponentInstance
 from mbs.assembly.tree import Frame, Link, quaternion_slices, zero_position
 from mbs.components import Damper, FixedTendon, Revolute, Rod, Spring
 from mbs.components.description import OUTER_WORLD

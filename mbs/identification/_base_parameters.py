@@ -67,27 +67,34 @@ _OF_THE_JOINT = ("Ia", "Fv", "Fs")
 
 
 def with_parameters(system: System, columns: Sequence[Column], values: SX) -> System:
-    """Return a copy of the system with these parameter values. Other parameters are unchanged.
+    """Return a copy of the system in which some dynamic parameters have new values.
 
-    The masses of its bodies become unknown. Offsets and parameters of coupled motors are ignored,
-    since a system does not contain them.
+    Other parameters are unchanged. The masses of its body list become None (unknown). Columns of
+    coupled motors are ignored, and so are offsets, since a system does not contain them.
 
     Args:
         system: open or closed.
-        columns: the parameters.
-        values: (n, 1) numbers, or expressions of the symbols of the system.
+        columns: parameters that are replaced: inertial parameters of links, rotor inertias and
+            friction of joints.
+        values: (n, 1) new value of each column: numbers, or expressions of the symbols of the
+            system.
     """
     given: dict[int, dict[str, SX]] = {}
     for column, value in zip(columns, elements(values), strict=True):
         if not column.other:
             given.setdefault(column.link - 1, {})[column.kind] = value
-    links = tuple(_with(link, given.get(j, {})) for j, link in enumerate(system.tree.links))
+    links = tuple(
+        _link_with_values(link, given.get(j, {})) for j, link in enumerate(system.tree.links)
+    )
     bodies = tuple(replace(row, mass=None) for row in system.bodies)
     return replace(system, tree=replace(system.tree, links=links), bodies=bodies, _cache={})
 
 
-def _with(link: Link, values: Mapping[str, SX]) -> Link:
-    """Return a link with some of its inertial, rotor and joint parameters replaced, by name."""
+def _link_with_values(link: Link, values: Mapping[str, SX]) -> Link:
+    """Return a copy of `link` with the parameters in `values` replaced.
+
+    Keys of `values` are kinds of parameters, such as "XX", "M", "Jm" or "Fv".
+    """
     ten = elements(link.inertia.parameters)
     ten = [values.get(name, old) for name, old in zip(INERTIAL, ten, strict=True)]
     rotor = link.rotor
@@ -108,13 +115,14 @@ def _with(link: Link, values: Mapping[str, SX]) -> Link:
 def deciding_symbols(
     system: System, columns: Sequence[Column], *, base_moves: bool = False
 ) -> tuple[str, ...]:
-    """Return the names of the parameters on which the regressor or the loop closure depends.
+    """Return the names of the system parameters on which the regressor or the loop closure depends.
 
-    Symbols that occur only in inertial parameters or friction are excluded.
+    These are symbols of lengths, angles and gravity. Symbols that occur only in inertial parameters
+    or friction are excluded. The tuple is empty if the system has no symbols.
 
     Args:
         system: open or closed.
-        columns: the parameters that are grouped.
+        columns: the dynamic parameters that are grouped.
         base_moves: whether the base has a prescribed motion.
     """
     if not system.parameters:
@@ -153,13 +161,17 @@ def with_constants(system: System, names: Sequence[str]) -> System:
             values[parameter.name] = parameter.default
     rest = [k for k, parameter in enumerate(system.parameters) if parameter.name not in values]
     parameters = tuple(system.parameters[k] for k in rest)
-    changed: System = _changer(system.symbol_table, values)(replace(system, _cache={}))
+    changed: System = _substitution(system.symbol_table, values)(replace(system, _cache={}))
     bounds = {name: own for name, own in system.bounds.items() if name not in values}
     return replace(changed, parameters=parameters, p=system.p[rest], bounds=bounds, _cache={})
 
 
-def _changer(symbols: Mapping[str, SX], values: Mapping[str, float]) -> Callable[[Any], Any]:
-    """Return a function that substitutes numbers for symbols in nested data of a system."""
+def _substitution(symbols: Mapping[str, SX], values: Mapping[str, float]) -> Callable[[Any], Any]:
+    """Return a function that substitutes numbers for symbols in any value of a system.
+
+    It descends into tuples, lists, dicts and dataclasses. `symbols` maps names to SX symbols,
+    `values` maps the names to substitute to numbers.
+    """
     before = casadi.vertcat(*(symbols[name] for name in values))
     after = SX(casadi.DM(np.array(list(values.values()))))
     done: dict[int, tuple[Any, Any]] = {}
@@ -192,7 +204,10 @@ def _changer(symbols: Mapping[str, SX], values: Mapping[str, float]) -> Callable
 
 
 def _rebuilt(value: Any, change: Callable[[Any], Any]) -> Any:
-    """Return a copy of a dataclass with changed fields, or the same object if nothing changes."""
+    """Return a copy of the dataclass `value` with `change` applied to each field.
+
+    The same object is returned if no field changes.
+    """
     fresh = {f.name: change(getattr(value, f.name)) for f in fields(value)}
     if all(fresh[name] is getattr(value, name) for name in fresh):
         return value
@@ -205,7 +220,7 @@ def _rebuilt(value: Any, change: Callable[[Any], Any]) -> Any:
 
 
 def _with_numbers(value: Expression, values: Mapping[str, float]) -> Expression:
-    """Return the expression with numbers for the parameters in `values`."""
+    """Return the expression `value` with numbers instead of the parameters named in `values`."""
     if isinstance(value, Parameter):
         return Number(values[value.name]) if value.name in values else value
     if isinstance(value, Operation):
@@ -222,7 +237,17 @@ _SEED = 20260412
 def numbers_at(
     system: System, columns: Sequence[Column], grouping: Grouping, p: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the coefficient matrix (kept, columns) of a grouping at parameter values p (np,)."""
+    """Return the matrix of a grouping at given parameter values.
+
+    Args:
+        system: system of the columns.
+        columns: the n dynamic parameters.
+        grouping: kept columns and the combination of columns of each.
+        p: (np,) values of the symbols of the system.
+
+    Returns:
+        (kept, n) matrix B with K_base = B K.
+    """
     rows = {k: row for row, k in enumerate(grouping.kept)}
     B = SX(len(rows), len(columns))
     for k, column, x in coefficients(grouping):
@@ -237,14 +262,18 @@ def checked_elsewhere(
     order: Sequence[int],
     structure: Structure,
 ) -> Check | None:
-    """Check a grouping at random states with other values of the symbols; None if it holds.
+    """Check a grouping at random states, with other values of the symbols than their defaults.
 
     Args:
         system: open, with symbols.
         columns: parameters of the system.
         grouping: grouping from the symbolic rules.
-        order: column indices in the order of preference.
+        order: column indices in the order in which columns are preferred as base parameters.
         structure: structure of the tree.
+
+    Returns:
+        None if the grouping holds. Otherwise the failed check; its text describes the missing
+        relations, which are not applied.
     """
     p = parameter_samples(system, system.p)[1]
     sample = RegressorSample.of(system, columns, p, _SEED, base_moves=structure.base_moves)
@@ -264,7 +293,9 @@ def grouped_by_rules(
     configurations: Sequence[ClosedConfigurations],
     structure: Structure,
 ) -> Grouping:
-    """Return the grouping that the symbolic rules produce.
+    """Return the grouping of the parameters that the symbolic rules produce.
+
+    Tree rules are applied first, then the rules of closed loops.
 
     Args:
         system: open or closed.
@@ -273,7 +304,7 @@ def grouped_by_rules(
         structure: structure of the tree.
     """
     indices = _column_indices(columns)
-    grouping = _by_tree(structure, Grouping.none(len(columns)), indices)
+    grouping = _after_tree_rules(structure, Grouping.none(len(columns)), indices)
     sampled = sampler(system)
     if not system.is_closed:
         return without_zeros(grouping, sampled)
@@ -283,28 +314,42 @@ def grouped_by_rules(
         *turning_relations(system, configurations, base_moves=structure.base_moves),
     ]
     for relation in relations:
-        terms = _terms(relation, indices)
+        terms = _by_column_index(relation, indices)
         if terms is not None:
             grouping = related(grouping, terms, lambda k: columns[k].link, sampled)
     return without_zeros(grouping, sampled)
 
 
-def _by_tree(structure: Structure, grouping: Grouping, indices: Mapping[Key, int]) -> Grouping:
-    """Return the grouping after the symbolic rules for trees."""
+def _after_tree_rules(
+    structure: Structure, grouping: Grouping, indices: Mapping[Key, int]
+) -> Grouping:
+    """Return `grouping` after the symbolic rules for trees.
+
+    `indices` maps (link index, kind) to the column index. A rule is skipped if one of its
+    parameters has no column.
+    """
     for removal in tree_rules(structure):
-        dropped, terms = indices.get(removal.parameter), _terms(removal.effects, indices)
+        dropped, terms = indices.get(removal.parameter), _by_column_index(removal.effects, indices)
         if dropped is not None and terms is not None and dropped in grouping.columns[dropped]:
             grouping = grouping.replaced(dropped, terms)
     return grouping
 
 
 def _column_indices(columns: Sequence[Column]) -> dict[Key, int]:
-    """Map (link, kind) to the column index, for parameters of one link or joint."""
+    """Return a dict from (0-based link index, kind) to the column index.
+
+    Parameters of motors that are coupled to two joints are left out.
+
+    `columns` are regressor columns in order.
+    """
     return {(c.link - 1, c.kind): k for k, c in enumerate(columns) if not c.other}
 
 
-def _terms(effects: Mapping[Key, SX], indices: Mapping[Key, int]) -> Terms | None:
-    """Map the keys of a combination to column indices; None if a parameter has no column."""
+def _by_column_index(effects: Mapping[Key, SX], indices: Mapping[Key, int]) -> Terms | None:
+    """Return the linear combination `effects` with column indices as keys.
+
+    `indices` maps (link index, kind) to the column index. None if a parameter has no column.
+    """
     if any(key not in indices for key in effects):
         return None
     return {indices[key]: x for key, x in effects.items()}
@@ -346,7 +391,7 @@ class BaseParameters:
     matrix: NDArray[np.float64]
     function: Function
     check: Check
-    _terms: tuple[Mapping[str, SX], ...]
+    _by_column_index: tuple[Mapping[str, SX], ...]
 
     def __repr__(self) -> str:
         return f"<BaseParameters {self.system.name}: {self.count} of {len(self.columns)}>"
@@ -363,28 +408,31 @@ class BaseParameters:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the base parameters; the suffix R, as in "XX2R", marks grouped parameters."""
-        pairs = zip(self.kept, self._terms, strict=True)
+        """Names of the base parameters, in the order of `kept`.
+
+        The suffix R, as in "XX2R", marks parameters that contain other parameters.
+        """
+        pairs = zip(self.kept, self._by_column_index, strict=True)
         return tuple(f"{c.name}R" if len(terms) > 1 else c.name for c, terms in pairs)
 
     @property
     def columns_in_base(self) -> tuple[Column, ...]:
-        """Kept columns with the names of the base parameters, as input of `regressor`."""
+        """Kept columns, renamed to the base parameters; pass them to `regressor` as its columns."""
         return tuple(replace(c, name=n) for c, n in zip(self.kept, self.names, strict=True))
 
     @property
     def equations(self) -> tuple[str, ...]:
         """Equation of each base parameter, such as "XX2R = XX2 - YY2 + 0.25*M3"."""
-        return tuple(map(equation, self.names, self._terms))
+        return tuple(map(equation, self.names, self._by_column_index))
 
     @property
     def without_effect(self) -> tuple[Column, ...]:
-        """Eliminated parameters that occur in no base parameter."""
-        used = {name for terms in self._terms for name in terms}
+        """Eliminated parameters that occur in no base parameter: no effort depends on them."""
+        used = {name for terms in self._by_column_index for name in terms}
         return tuple(column for column in self.eliminated if column.name not in used)
 
     def text(self) -> str:
-        """Return the base parameters, their equations and the check as plain text."""
+        """Return a printable report: base parameters with units, their equations, and the check."""
         rows = [(name, c.unit) for name, c in zip(self.names, self.kept, strict=True)]
         without = ", ".join(column.name for column in self.without_effect) or "none"
         grouped = [c.name for c in self.eliminated if c not in self.without_effect]
@@ -395,7 +443,7 @@ class BaseParameters:
             f"Grouped with others: {', '.join(grouped) or 'none'}",
             *(
                 text
-                for text, terms in zip(self.equations, self._terms, strict=True)
+                for text, terms in zip(self.equations, self._by_column_index, strict=True)
                 if len(terms) > 1
             ),
             self.check.text,
@@ -455,7 +503,7 @@ def base_parameters(
     require_system(system)
     _check_method(system, method, order)
     chosen = chosen_columns(system, columns, {})
-    first = _first(system, chosen, order or ())
+    first = _priority_indices(system, chosen, order or ())
     preference = preferred_order(chosen, first)
     deciding = deciding_symbols(system, chosen, base_moves=moving_base)
     if method == "numeric":
@@ -466,7 +514,9 @@ def base_parameters(
     )
     if method == "numeric":
         grouping, check = grouped_by_rank(sample, preference)
-        return _result(system, method, chosen, grouping, _at_constants(check, deciding))
+        return _base_parameters_of(
+            system, method, chosen, grouping, _noting_constants(check, deciding)
+        )
     structure = structure_of(system, base_moves=moving_base)
     found = _by_rules(system, sample, structure, preference, seed, symbolic=bool(deciding))
     if found is None:
@@ -477,11 +527,11 @@ def base_parameters(
         return replace(
             numeric, method=method, check=replace(numeric.check, agrees=False, text=told)
         )
-    return _result(system, method, chosen, *found)
+    return _base_parameters_of(system, method, chosen, *found)
 
 
-def _at_constants(check: Check, names: Sequence[str]) -> Check:
-    """Add to the check the symbols at whose default values the grouping holds."""
+def _noting_constants(check: Check, names: Sequence[str]) -> Check:
+    """Return `check` with a note that the grouping holds only at the defaults of the `names`."""
     if not names:
         return check
     return replace(
@@ -498,9 +548,10 @@ def _by_rules(
     *,
     symbolic: bool,
 ) -> tuple[Grouping, Check] | None:
-    """Return the grouping of the symbolic rules, checked and completed at random states.
+    """Return the grouping of the symbolic rules and its check at the random states of `sample`.
 
-    None if the rules are not exact, so that the numeric rank must be used.
+    `order` lists column indices by preference; `symbolic` is whether the regressor depends on
+    symbols. None if the rules are not exact, so that the numeric rank must be used.
     """
     configurations = _configurations(system, seed, symbolic=symbolic)
     grouping = grouped_by_rules(system, sample.columns, configurations, structure)
@@ -509,10 +560,10 @@ def _by_rules(
     if check.agrees and symbolic and not system.is_closed:
         doubt = checked_elsewhere(system, sample.columns, grouping, order, structure)
         return grouping, doubt or check
-    return _complete(sample, grouping, check, order, symbolic=symbolic)
+    return _completed_numerically(sample, grouping, check, order, symbolic=symbolic)
 
 
-def _complete(
+def _completed_numerically(
     sample: RegressorSample,
     grouping: Grouping,
     check: Check,
@@ -520,7 +571,11 @@ def _complete(
     *,
     symbolic: bool,
 ) -> tuple[Grouping, Check] | None:
-    """Add the relations that the rules missed, if they hold for all values of the symbols."""
+    """Add the relations that the rules missed to `grouping`; return it with its check.
+
+    If `symbolic`, they hold only at the default values of the symbols and are not added. None if
+    `check` failed without giving such relations.
+    """
     if check.agrees:
         return grouping, check
     if not check.relations:
@@ -534,9 +589,10 @@ def _complete(
 
 
 def _configurations(system: System, seed: int, *, symbolic: bool) -> list[ClosedConfigurations]:
-    """Return closed configurations at the default values of the symbols, and at other values.
+    """Return random configurations that close the loops; an empty list for an open system.
 
-    They differ from the configurations of the check.
+    They are drawn with `seed` + 1, at the default values of the symbols and, if `symbolic`, also
+    at other values.
     """
     if not system.is_closed:
         return []
@@ -545,10 +601,14 @@ def _configurations(system: System, seed: int, *, symbolic: bool) -> list[Closed
     return [ClosedConfigurations(closed_positions(system, p, count, seed + 1), p) for p in values]
 
 
-def _result(
+def _base_parameters_of(
     system: System, method: str, columns: tuple[Column, ...], grouping: Grouping, check: Check
 ) -> BaseParameters:
-    """Return the base parameters with their combinations, from the kept columns of a grouping."""
+    """Return the `BaseParameters` of a grouping, with matrix, expressions and CasADi function.
+
+    `columns` are all parameters, `grouping` and `check` are results of `method`, a name such as
+    "symbolic".
+    """
     kept = grouping.kept
     K = casadi.vertcat(SX(0, 1), *(SX.sym(column.name) for column in columns))
     values = {k: K[k] for k in kept}
@@ -572,7 +632,7 @@ def _result(
         matrix=numbers_at(system, columns, grouping, default_parameters(system)),
         function=ModelFunction(function, system),
         check=check,
-        _terms=tuple(terms[k] for k in kept),
+        _by_column_index=tuple(terms[k] for k in kept),
     )
 
 
@@ -587,8 +647,13 @@ def _check_method(system: System, method: str, order: Sequence[str] | None) -> N
         )
 
 
-def _first(system: System, columns: Sequence[Column], order: Sequence[str]) -> list[int]:
-    """Return column indices of the parameters that the user wants to keep first."""
+def _priority_indices(system: System, columns: Sequence[Column], order: Sequence[str]) -> list[int]:
+    """Return the column indices of the parameters named in `order`, which are kept with priority.
+
+    Raises ModelError for an unknown name.
+
+    `columns` are all parameters.
+    """
     names = [column.name for column in columns]
     for name in order:
         if name not in names:

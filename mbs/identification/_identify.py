@@ -38,7 +38,7 @@ from mbs.identification.observations import (
 )
 from mbs.identification.options import IdentifyArguments
 from mbs.identification.record import Record
-from mbs.identification.regressors import INERTIAL, Joints, regressor
+from mbs.identification.regressors import INERTIAL, regressor
 from mbs.options import arguments_of
 from mbs.progress import progress
 from mbs.text import did_you_mean, quoted
@@ -64,7 +64,7 @@ def report(estimate: Estimate, *tests: tuple[str, Residuals]) -> str:
     """Return a text report of parameters, standard deviations, residuals and excitation.
 
     Args:
-        estimate: estimate of any method.
+        estimate: parameter values, covariance and residuals of any estimation method.
         *tests: pairs (title, residuals) of further tests, such as ("last quarter", held_out(...)).
 
     Returns:
@@ -77,18 +77,18 @@ def report(estimate: Estimate, *tests: tuple[str, Residuals]) -> str:
         f"Identification by {estimate.method}: {len(estimate.names)} parameters from"
         f" {rows} instants of {m} efforts, {span:.4g} s",
         "",
-        *_parameters(estimate),
+        *_parameter_lines(estimate),
         "",
-        *_residuals("Errors", estimate.residuals),
+        *_residual_lines("Errors", estimate.residuals),
     ]
     for title, residuals in tests:
-        lines += ["", *_residuals(f"Errors, {title}", residuals)]
+        lines += ["", *_residual_lines(f"Errors, {title}", residuals)]
     remarks = [
-        *_fit(estimate.residuals),
-        *_drop(observations),
-        *_excitation(estimate),
-        *_consistency(estimate),
-        *_signs(estimate),
+        *_misfit_remark(estimate.residuals),
+        *_dropped_remark(observations),
+        *_excitation_remark(estimate),
+        *_consistency_remark(estimate),
+        *_sign_remark(estimate),
     ]
     return "\n".join([*lines, "", *remarks])
 
@@ -100,9 +100,13 @@ def identification_report(
 
     Args:
         estimate: estimate of base parameters.
-        essential: reduced estimate with the essential parameters.
-        bodies: estimate of the full parameter set, or the reason why there is none.
+        essential: result of the reduction of `estimate` to its essential parameters.
+        bodies: physically consistent estimate of the full parameter set, or the reason why there
+            is none.
         *tests: pairs (title, residuals) of further tests of the base parameters.
+
+    Returns:
+        Lines of text.
     """
     few = essential.estimate
     lines = [
@@ -114,8 +118,8 @@ def identification_report(
     return "\n".join([report(estimate, *tests), "", *lines, "", told])
 
 
-def _parameters(estimate: Estimate) -> list[str]:
-    """Return the lines of the table of parameters: value, deviation and relative deviation."""
+def _parameter_lines(estimate: Estimate) -> list[str]:
+    """Return the lines of the table of parameters: name, value and standard deviation."""
     lines = [f"{'parameter':<12}{'value':>12}{'deviation':>12}{'%':>9}  unit"]
     rows = zip(
         estimate.columns, estimate.values, estimate.deviations, estimate.percent, strict=True
@@ -129,8 +133,11 @@ def _parameters(estimate: Estimate) -> list[str]:
     return lines
 
 
-def _residuals(title: str, residuals: Residuals) -> list[str]:
-    """Return the lines of the table of residuals of the efforts."""
+def _residual_lines(title: str, residuals: Residuals) -> list[str]:
+    """Return the lines of a table of residuals: percentage, rms and independent rows per effort.
+
+    `title` is printed in its first line.
+    """
     lines = [
         f"{title}: {residuals.total_percent:.2f} % of all efforts",
         f"{'effort':<12}{'error':>10}{'rms':>12}  {'unit':<6}{'independent rows':>18}",
@@ -149,8 +156,8 @@ def _residuals(title: str, residuals: Residuals) -> list[str]:
     ]
 
 
-def _fit(residuals: Residuals) -> list[str]:
-    """Return a remark if the residuals are too large to be noise."""
+def _misfit_remark(residuals: Residuals) -> list[str]:
+    """Return a remark as a list of one line if the residuals are too large to be noise, else []."""
     if not residuals.total_percent > _UNFIT:
         return []
     return [
@@ -159,8 +166,8 @@ def _fit(residuals: Residuals) -> list[str]:
     ]
 
 
-def _drop(observations: Observations) -> list[str]:
-    """Return a remark on instants near singular configurations that are left out."""
+def _dropped_remark(observations: Observations) -> list[str]:
+    """Return a remark on instants near singular configurations missing in `observations`, or []."""
     if not observations.dropped:
         return []
     rows = len(observations.time)
@@ -170,8 +177,11 @@ def _drop(observations: Observations) -> list[str]:
     ]
 
 
-def _excitation(estimate: Estimate) -> list[str]:
-    """Return a remark on the excitation; none for a full set, which is never fully identifiable."""
+def _excitation_remark(estimate: Estimate) -> list[str]:
+    """Return a remark on the condition number, or on parameters that are not identifiable.
+
+    [] for a full parameter set, which is never fully identifiable.
+    """
     if _is_full(estimate):
         return []
     quality = excitation_quality(estimate.observations)
@@ -183,8 +193,11 @@ def _excitation(estimate: Estimate) -> list[str]:
     ]
 
 
-def _consistency(estimate: Estimate) -> list[str]:
-    """Return a remark on physical consistency, if all parameters of every link are estimated."""
+def _consistency_remark(estimate: Estimate) -> list[str]:
+    """Return a remark whether each link has a positive definite pseudo-inertia.
+
+    [] unless all ten inertial parameters of every link are estimated.
+    """
     if not _is_full(estimate):
         return []
     links = {c.link for c in estimate.columns if c.kind in INERTIAL}
@@ -201,8 +214,8 @@ def _is_full(estimate: Estimate) -> bool:
     return len(inertial) == len(INERTIAL) * len({c.link for c in inertial}) > 0
 
 
-def _signs(estimate: Estimate) -> list[str]:
-    """Return a remark on friction and rotor inertias that are significantly negative."""
+def _sign_remark(estimate: Estimate) -> list[str]:
+    """Return a remark on friction or rotor inertias that are significantly negative, or []."""
     rows = zip(estimate.columns, estimate.values, estimate.deviations, strict=True)
     kinds = ("Ia", "Iam", "Jm", "Fv", "Fvm", "Fs", "Fsm")
     bad = [c.name for c, x, s in rows if c.kind in kinds and x < -_SURE * s]
@@ -251,11 +264,20 @@ class Identification:
         )
 
     def essential(self, largest_percent: float = LARGEST_PERCENT) -> Essential:
-        """Return the essential base parameters; see `essential`."""
+        """Return the estimate reduced to the essential base parameters.
+
+        Args:
+            largest_percent: relative standard deviation [%] at which the elimination ends; see
+                `mbs.identification.essential`.
+        """
         return essential(self.estimate, largest_percent)
 
     def cross_validated(self, count: int = 4) -> Residuals:
-        """Return the residuals of each part of the record, with parameters from the other parts."""
+        """Return the residuals of each part of the record, with parameters from the other parts.
+
+        Args:
+            count: number of parts, at least two.
+        """
         return cross_validated(self.estimator, self.estimate.observations, count)
 
     def identified_system(self) -> System:
@@ -268,7 +290,7 @@ class Identification:
         return with_parameters(self.system, bodies.columns, SX(DM(bodies.values)))
 
     def bodies_table(self) -> str:
-        """Return mass, centre of mass and inertia of every body in its own frame, as a text table.
+        """Return a text table of mass, centre of mass and inertia of every body in its own frame.
 
         Raises:
             ModelError: no bodies were found.
@@ -277,7 +299,7 @@ class Identification:
         return bodies_table(self.system, bodies.columns, bodies.values)
 
     def text(self) -> str:
-        """Return both parameter sets with standard deviations and residuals as text."""
+        """Return a printable report of base parameters, essential parameters and bodies."""
         title = (
             f"{self.system.name}: {self.base.count} base parameters of {len(self.base.columns)},"
             f" bandwidth {self.bandwidth:g} Hz"
@@ -318,10 +340,14 @@ def identify(options: IdentifyArguments) -> Identification:
         SolverError: the estimation of the base parameters did not converge.
     """
     system, bandwidth, method = options.system, options.bandwidth, options.method
-    _check(system, method, options.equations, options.smoothing)
-    records = _records(system, options.record, bandwidth)
+    _check_choices(system, method, options.equations, options.smoothing)
+    records = _record_tuple(system, options.record, bandwidth)
     known = options.prior or Prior()
-    chosen = _options(options.rotors, options.offsets, options.couplings)
+    chosen: dict[str, Any] = {
+        "rotors": options.rotors,
+        "offsets": options.offsets,
+        "couplings": options.couplings,
+    }
     with progress(f"{system.name}: identification", 0.0, 1.0, quiet=options.quiet) as reached:
         D = regressor(system, **chosen)
         base = base_parameters(system, columns=D.columns)
@@ -332,7 +358,7 @@ def identify(options: IdentifyArguments) -> Identification:
         grouped = full.grouped(base)
         reached(_EQUATIONS_DONE)
         physical = physically_consistent if method == "least_squares" else consistent_weighted
-        watch = partial(_between, reached, _EQUATIONS_DONE, _BODIES_DONE)
+        watch = partial(_partial_progress, reached, _EQUATIONS_DONE, _BODIES_DONE)
         bodies, reason = _found_bodies(partial(physical, full, known, watch), method)
         reached(_BODIES_DONE)
         estimator = METHODS[method](Setting(D, base, samples, full, bodies, known))
@@ -345,7 +371,10 @@ def identify(options: IdentifyArguments) -> Identification:
 
 
 def _found_bodies(search: Callable[[], Estimate], method: str) -> tuple[Estimate | None, str]:
-    """Return the bodies and "", or None and the error text if the method does not require them."""
+    """Call `search`; return its estimate and "", or None and the message if it does not converge.
+
+    The error is raised if the method is "consistent", which requires the bodies.
+    """
     try:
         return search(), ""
     except SolverError as error:
@@ -354,15 +383,20 @@ def _found_bodies(search: Callable[[], Estimate], method: str) -> tuple[Estimate
         return None, str(error)
 
 
-def _between(reached: Callable[[float], None], first: float, last: float, part: float) -> None:
-    """Report a progress between `first` and `last`, for a fraction `part` from 0 to 1."""
+def _partial_progress(
+    reached: Callable[[float], None], first: float, last: float, part: float
+) -> None:
+    """Call `reached` with the progress between `first` and `last` at fraction `part` (0 to 1)."""
     reached(first + part * (last - first))
 
 
-def _records(
+def _record_tuple(
     system: System, record: Record | Sequence[Record], bandwidth: float
 ) -> tuple[Record, ...]:
-    """Return the records as a tuple, after type checks."""
+    """Return one record or a list of records as a tuple.
+
+    Raises ModelError for another type, an empty list, or a bandwidth that is not a number.
+    """
     given = tuple(record) if isinstance(record, list | tuple) else (record,)
     for one in given:
         if not isinstance(one, Record):
@@ -379,13 +413,8 @@ def _records(
     return given
 
 
-def _options(rotors: bool, offsets: bool, couplings: Sequence[Joints]) -> dict[str, Any]:
-    """Return the options of the regressor as a dict."""
-    return {"rotors": rotors, "offsets": offsets, "couplings": couplings}
-
-
-def _check(system: System, method: str, equations: str, smoothing: object) -> None:
-    """Raise ModelError if an option of the identification is invalid."""
+def _check_choices(system: System, method: str, equations: str, smoothing: object) -> None:
+    """Raise ModelError if the method, the equations or the smoothing function is unknown."""
     require_system(system)
     if not callable(smoothing):
         raise ModelError(

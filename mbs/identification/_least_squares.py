@@ -16,9 +16,14 @@ from mbs.identification.leading import (
     active_indices,
     configuration_of,
     is_explicit,
-    of_motion,
+    motion_function,
 )
-from mbs.identification.observations import Observations, known_of, motion_of, require_visible
+from mbs.identification.observations import (
+    Observations,
+    known_efforts_at,
+    motion_of,
+    require_visible,
+)
 from mbs.identification.record import Samples
 from mbs.identification.triangle import triangle, triangle_solved
 
@@ -66,14 +71,22 @@ class EffortEquations:
 
     @classmethod
     def of(cls, observations: Observations) -> EffortEquations:
-        """Compress observations; the errors are assumed independent until `with_errors`."""
+        """Compress observations by QR. Errors count as independent until `with_errors` is called.
+
+        Args:
+            observations: equations y = W K of n instants and m efforts.
+        """
         W, y = observations.W, observations.y
         m = y.shape[1]
         parts = tuple(triangle(np.column_stack([W[:, j], y[:, j]])) for j in range(m))
         return cls(parts, len(y), np.ones(m))
 
     def with_errors(self, error: Array) -> EffortEquations:
-        """Return a copy with the autocorrelation of the residuals `error` (n, m)."""
+        """Return a copy that accounts for the autocorrelation of the residuals.
+
+        Args:
+            error: (n, m) residuals of the efforts.
+        """
         return EffortEquations(self.triangles, self.rows, repetition(error))
 
     def solved(self, weights: Array) -> Fit:
@@ -92,7 +105,11 @@ class EffortEquations:
         return Fit(inverse @ T[:k, k], inverse.T, np.array(own))
 
     def squares(self, values: Array) -> Array:
-        """Return the sum of squared residuals (m,) of each effort."""
+        """Return the sum of squared residuals (m,) of each effort.
+
+        Args:
+            values: (k,) parameters.
+        """
         with_effort = np.append(values, -1.0)
         return np.array([np.sum((T @ with_effort) ** 2) for T in self.triangles])
 
@@ -100,17 +117,25 @@ class EffortEquations:
         """Return the standard deviation (m,) of the error of each effort [N m or N].
 
         It is the root of the sum of squares over the degrees of freedom, rows - `own`.
+
+        Args:
+            fit: least-squares solution of these equations.
         """
         left = np.maximum(self.rows - fit.own, 1.0)
         efforts = [np.linalg.norm(T[:, -1]) / np.sqrt(self.rows) for T in self.triangles]
         return above_rounding(np.sqrt(self.squares(fit.values) / left), np.array(efforts))
 
     def covariance(self, fit: Fit, weights: Array, deviations: Array) -> Array:
-        """Return the covariance (k, k) of the parameters for given error deviations of the efforts.
+        """Return the covariance (k, k) of the parameters of a weighted solution.
 
         The weights may differ from the inverse deviations. Correlated rows count less.
 
         Source: White 1980 (heteroscedastic errors).
+
+        Args:
+            fit: solution with these weights.
+            weights: (m,) weights of the efforts.
+            deviations: (m,) standard deviations of the errors of the efforts.
         """
         scale = weights * deviations * np.sqrt(self.repeated)
         pairs = zip(weights * scale, self.triangles, strict=True)
@@ -119,11 +144,11 @@ class EffortEquations:
 
 
 def above_rounding(deviations: Array, efforts: Array) -> Array:
-    """Return the deviations (m,) of errors, bounded from below by the rounding error.
+    """Return the standard deviations (m,) of errors, at least as large as rounding errors.
 
     Args:
-        deviations: (m,) standard deviations.
-        efforts: (m,) root mean square of each effort.
+        deviations: (m,) standard deviations [N m or N].
+        efforts: (m,) root mean square of each effort [N m or N].
     """
     least = max(_ROUNDING * float(efforts.max()), _ROUNDING**2)
     return np.asarray(np.maximum(deviations, least), dtype=float)
@@ -156,10 +181,17 @@ def weighted_solution(
     method: str,
     rounds: int,
 ) -> Estimate:
-    """Solve least squares with given weights (m,) of the efforts.
+    """Solve least squares with given weights of the efforts and estimate the covariance.
 
     Error deviations are estimated from a second solution with optimal weights, so that large errors
     of one effort do not affect the deviations of the other efforts.
+
+    Args:
+        observations: equations y = W K.
+        equations: the same equations in compressed form.
+        weights: (m,) weights of the efforts [1/(N m) or 1/N].
+        method: name of the method in the result.
+        rounds: number of iterations in the result.
     """
     fit = equations.solved(weights)
     better = equations.solved(1 / equations.deviations(fit))
@@ -263,8 +295,10 @@ def huber(
     equations, values = EffortEquations.of(observations), start.values
     for number in range(1, most + 1):
         error = observations.y - observations.W @ values
-        scale = _deviations(error, observations.y)
-        following = _solved(observations, np.sqrt(_trust(error / scale, bound)) / scale)
+        scale = _median_deviations(error, observations.y)
+        following = _row_weighted_solution(
+            observations, np.sqrt(_huber_weights(error / scale, bound)) / scale
+        )
         change = np.abs(following - values) / start.deviations
         values = following
         if change.max() < tolerance:
@@ -279,13 +313,16 @@ def huber(
     )
 
 
-def _trust(size: Array, bound: float) -> Array:
-    """Return the Huber weight (n, m) of each error in standard deviations: 1 up to the bound."""
+def _huber_weights(size: Array, bound: float) -> Array:
+    """Return the Huber weight (n, m) of each error: 1 up to `bound`, then bound/|size|.
+
+    `size` (n, m) are errors in standard deviations.
+    """
     return np.asarray(bound / np.maximum(np.abs(size), bound), dtype=float)
 
 
-def _solved(observations: Observations, rows: Array) -> Array:
-    """Solve least squares (k,) with a weight for each row and effort, (n, m)."""
+def _row_weighted_solution(observations: Observations, rows: Array) -> Array:
+    """Return the least-squares parameters (k,) with weights `rows` (n, m) of single equations."""
     W, y = observations.rows
     w = rows.reshape(-1)
     A, lengths = W * w[:, None], np.linalg.norm(W * w[:, None], axis=0)
@@ -295,14 +332,14 @@ def _solved(observations: Observations, rows: Array) -> Array:
 def _robust_covariance(
     observations: Observations, equations: EffortEquations, values: Array, bound: float
 ) -> Array:
-    """Return the covariance (k, k) of the Huber estimate, with the inlier fraction of each effort.
+    """Return the covariance (k, k) of Huber parameters `values` (k,) with the loss bound `bound`.
 
     Source: Huber 1964 (variance of the estimator); Street, Carroll & Ruppert 1988.
     """
     error = observations.y - observations.W @ values
-    scale = _deviations(error, observations.y)
+    scale = _median_deviations(error, observations.y)
     trusted = np.mean(np.abs(error) < bound * scale, axis=0)
-    kept = error * _trust(error / scale, bound)
+    kept = error * _huber_weights(error / scale, bound)
     weights = np.sqrt(trusted) / scale
     fit = equations.solved(weights)
     left = np.maximum(len(error) - fit.own, 1.0)
@@ -310,8 +347,11 @@ def _robust_covariance(
     return equations.with_errors(kept).covariance(fit, weights, deviations)
 
 
-def _deviations(error: Array, efforts: Array) -> Array:
-    """Return the standard deviation (m,) of each column from its median absolute error."""
+def _median_deviations(error: Array, efforts: Array) -> Array:
+    """Return a standard deviation (m,) of each column of `error` (n, m) from its median magnitude.
+
+    It is at least the rounding error of the `efforts` (n, m).
+    """
     size = np.median(np.abs(error), axis=0) / _MEDIAN_OF_NORMAL
     return above_rounding(size, np.sqrt(np.mean(efforts**2, axis=0)))
 
@@ -363,7 +403,11 @@ def instrumental(
 def _instrumental_covariance(
     instruments: Observations, inverse: Array, weights: Array, error: Array
 ) -> Array:
-    """Return the covariance (k, k) of (Z' W)^-1 Z' y, with separate error deviations of efforts."""
+    """Return the covariance (k, k) of the instrumental-variable estimate.
+
+    `inverse` (k, k) is (Z' W)^-1, `weights` (m,) are those of the efforts and `error` (n, m) the
+    residuals, whose deviation may differ between efforts.
+    """
     n, m = error.shape
     left = max(n - inverse.shape[0] / m, 1.0)
     deviations = np.sqrt(np.sum(error**2, axis=0) * repetition(error) / left)
@@ -391,7 +435,8 @@ def simulated_motion(
     Source: Janot, Vandanjon & Gautier 2014 (simulated instruments).
 
     Args:
-        regressor: Function D(q, v, a) with `.columns` and `.system`, open or closed.
+        regressor: Function D(q, v, a) with `.columns` and `.system`, such as the result of
+            `regressor`.
         values: (k,) parameters of the columns, physically consistent, so that the inertia matrix is
             positive definite.
         samples: measured motion; its time step must be short compared with the motion.
@@ -422,9 +467,9 @@ def simulated_motion(
         )
     q, v, _ = motion_of(regressor, samples)
     q_a = q[:, active_indices(regressor.system)]
-    acceleration = _acceleration(regressor, K, 2 * np.pi * follow)
+    acceleration = _tracked_acceleration(regressor, K, 2 * np.pi * follow)
     step = _runge_kutta(acceleration, 1.0 / samples.rate)
-    inputs = np.hstack([q_a, v, samples.tau - known_of(regressor, samples)]).T
+    inputs = np.hstack([q_a, v, samples.tau - known_efforts_at(regressor, samples)]).T
     m, count = q_a.shape[1], inputs.shape[1] - 1
     start = np.concatenate([q_a[0], v[0]])
     states = step.mapaccum(count)(DM(start), inputs[:, :-1], inputs[:, 1:]).full()
@@ -438,9 +483,14 @@ def simulated_motion(
     return replace(samples, q=states[:m].T, v=states[m:].T, a=a.T)
 
 
-def _acceleration(regressor: Any, K: Array, w: float) -> Function:
-    """Return (state, given) -> a of the robot under the measured efforts and the controller."""
-    m, kind = int(regressor.size1_in(1)), _kind(regressor)
+def _tracked_acceleration(regressor: Any, K: Array, w: float) -> Function:
+    """Return the Function (state, given) -> a (m, 1) of the robot with a tracking controller.
+
+    state is (q, v); given is (q_m, v_m, tau): measured motion and efforts. K (k,) are the
+    parameters, `w` is the bandwidth of the controller [rad/s].
+    """
+    m = int(regressor.size1_in(1))
+    kind: Any = SX if is_explicit(regressor.system) else MX  # MX for an iterative loop closure
     state, given, a = kind.sym("state", 2 * m), kind.sym("given", 3 * m), kind.sym("a", m)
     q, v = state[:m], state[m:]
     q_m, v_m, tau = given[:m], given[m : 2 * m], given[2 * m :]
@@ -455,21 +505,19 @@ def _acceleration(regressor: Any, K: Array, w: float) -> Function:
 
 
 def _efforts(regressor: Any, K: Array) -> Function:
-    """Return (q_a, v_a, a_a) -> D K, the efforts of the independent joints."""
+    """Return the Function (q_a, v_a, a_a) -> D K: efforts (m, 1) for the parameters K (k,)."""
     m = int(regressor.size1_in(1))
     q, v, a = (MX.sym(name, m) for name in "qva")
-    D = of_motion(regressor)(configuration_of(regressor.system, q), v, a)
+    D = motion_function(regressor)(configuration_of(regressor.system, q), v, a)
     function = Function("efforts", [q, v, a], [casadi.mtimes(D, DM(K))])
     return function.expand() if is_explicit(regressor.system) else function
 
 
-def _kind(regressor: Any) -> Any:
-    """Return SX if the loops close without iteration, otherwise MX."""
-    return SX if is_explicit(regressor.system) else MX
-
-
 def _runge_kutta(acceleration: Function, h: float) -> Function:
-    """Return the Function of a Runge-Kutta step of length h [s]."""
+    """Return the Function (x, now, then) -> x of one Runge-Kutta step of length h [s].
+
+    x is (q, v); now and then are the measured inputs at the start and the end of the step.
+    """
     m = acceleration.size1_out(0)
     kind: Any = MX if acceleration.is_a("MXFunction") else SX
     x, now, then = (kind.sym(*pair) for pair in (("x", 2 * m), ("now", 3 * m), ("then", 3 * m)))

@@ -65,11 +65,14 @@ class Prior:
             )
 
     def masses(self, links: int) -> Array:
-        """Return the upper bounds (links,) on the masses [kg].
+        """Return the upper bounds (links,) on the masses of the links [kg].
+
+        Args:
+            links: number of links.
 
         Raises:
             ModelError: the number of bounds differs from the number of links, or the total mass
-                exceeds their sum.
+                is not less than the sum of the bounds.
         """
         given = np.atleast_1d(np.asarray(self.heaviest, dtype=float))
         if given.size not in (1, links):
@@ -136,12 +139,20 @@ class Misfit:
 
     @classmethod
     def of_rows(cls, A: Array, b: Array) -> Misfit:
-        """Return an equivalent misfit with at most k + 1 rows, equal up to a constant."""
+        """Return the cost |A K - b|^2 / 2 with at most k + 1 rows; QR preserves it.
+
+        Args:
+            A: (n, k) weighted matrix of the equations.
+            b: (n,) weighted right-hand side.
+        """
         return cls(*compressed(A, b))
 
 
 def whole_links(columns: Sequence[Column]) -> list[int]:
-    """Return the numbers of the links whose ten inertial parameters are all among the columns.
+    """Return the numbers (from 1) of the links of the inertial parameters in `columns`.
+
+    Args:
+        columns: parameters, with all ten inertial parameters of a link or none.
 
     Raises:
         ModelError: a link has only some of its inertial parameters.
@@ -161,9 +172,10 @@ def whole_links(columns: Sequence[Column]) -> list[int]:
 
 
 def pseudo_inertias(columns: Sequence[Column], values: Array) -> dict[int, Array]:
-    """Return the pseudo-inertia (4, 4) of each link [kg m^2, kg m, kg], by link number.
+    """Return the pseudo-inertia (4, 4) of each link, by link number (from 1).
 
-    It is positive definite for a physical body.
+    It is [[S, m s], [m s', m]] about the origin and in the axes of the link frame [kg m^2, kg m,
+    kg], and positive definite for a physical body.
 
     Args:
         columns: parameters, with all ten inertial parameters of every link.
@@ -173,17 +185,29 @@ def pseudo_inertias(columns: Sequence[Column], values: Array) -> dict[int, Array
     found = {}
     for link in whole_links(columns):
         ten = SX(DM([float(values[at[kind, link]]) for kind in INERTIAL]))
-        found[link] = _numbers(_matrix(PseudoInertia.of(Inertia.from_parameters(ten))))
+        found[link] = _constant_array(
+            _body_pseudo_inertia(PseudoInertia.of(Inertia.from_parameters(ten)))
+        )
     return found
 
 
 def consistent_links(columns: Sequence[Column], values: Array) -> list[int]:
-    """Return the numbers of the links with a positive definite pseudo-inertia (physical bodies)."""
+    """Return the numbers (from 1) of the links whose parameters are those of a physical body.
+
+    Their pseudo-inertia is positive definite.
+
+    Args:
+        columns: parameters, with all ten inertial parameters of every link.
+        values: (k,) values of the columns.
+
+    Raises:
+        ModelError: a link has only some of its inertial parameters.
+    """
     pairs = pseudo_inertias(columns, values).items()
     return [link for link, P in pairs if np.linalg.eigvalsh(P)[0] > 0]
 
 
-def likeliest(
+def penalised_minimum(
     misfit: Misfit, columns: Sequence[Column], prior: Prior, watch: Watch | None = None
 ) -> tuple[Array, Array]:
     """Return the parameters that minimise the misfit plus the weighted divergence from the guess.
@@ -209,7 +233,10 @@ def likeliest(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _PhysicalProblem:
-    """Nonlinear programme in the log-Cholesky variables of the links."""
+    """Nonlinear programme in the log-Cholesky variables of the links.
+
+    `roots` maps the link number to C with C C' equal to the pseudo-inertia of the guess.
+    """
 
     misfit: Misfit
     columns: tuple[Column, ...]
@@ -217,7 +244,14 @@ class _PhysicalProblem:
     prior: Prior
 
     def solved(self, watch: Watch | None) -> Array:
-        """Return the parameters (k,) at the minimum."""
+        """Return the parameters (k,) at the minimum, in the order of the columns.
+
+        Args:
+            watch: progress callback, or None.
+
+        Raises:
+            SolverError: IPOPT does not converge.
+        """
         own = [c for c in self.columns if c.kind not in INERTIAL]
         scale = self._scales(own)
         x, z = SX.sym("x", 10, len(self.roots)), SX.sym("z", len(own))
@@ -232,9 +266,13 @@ class _PhysicalProblem:
         if self.prior.total_mass is not None:
             masses = casadi.vertcat(masses, casadi.sum1(masses))
         programme = {"x": variables, "f": cost, "g": masses}
-        return _numbers(at(self._minimum(programme, own, watch)))[:, 0]
+        return _constant_array(at(self._minimum(programme, own, watch)))[:, 0]
 
     def _minimum(self, programme: dict[str, SX], own: list[Column], watch: Watch | None) -> DM:
+        """Solve `programme` with IPOPT and return its variables; raise SolverError if it fails.
+
+        `own` are the columns that are not inertial parameters: rotor inertias, friction, offsets.
+        """
         links = len(self.roots)
         total = [] if self.prior.total_mass is None else [self.prior.total_mass]
         follower = SolverFollower(programme, _ROUNDS, watch)
@@ -259,18 +297,25 @@ class _PhysicalProblem:
         return DM(answer["x"])
 
     def _scales(self, own: list[Column]) -> list[float]:
-        """Return the values of the joint parameters that change the misfit by about one."""
+        """Return for each column in `own` the change of value that changes the misfit by one."""
         lengths = np.linalg.norm(self.misfit.R, axis=0)
         at = {c.name: float(lengths[k]) or 1.0 for k, c in enumerate(self.columns)}
         return [max(float(np.linalg.norm(self.misfit.rho)), 1.0) / at[c.name] for c in own]
 
     def _link(self, link: int, x: SX) -> SX:
-        """Return the inertial parameters (10, 1) of the pseudo-inertia C L L' C'."""
-        root = casadi.mtimes(DM(self.roots[link]), _triangle(x))
+        """Return the inertial parameters (10, 1) of a link from log-Cholesky variables x (10, 1).
+
+        Its pseudo-inertia is C L L' C', with C the root of the guess.
+        """
+        root = casadi.mtimes(DM(self.roots[link]), _cholesky_factor(x))
         P = casadi.mtimes(root, root.T)
         return PseudoInertia(P[:3, :3], P[:3, 3], P[3, 3]).inertia().parameters
 
     def _parameters(self, links: dict[int, SX], own: dict[str, SX]) -> SX:
+        """Return the parameters (k, 1) in the order of the columns.
+
+        `links` maps link numbers to ten inertial parameters, `own` names to the other parameters.
+        """
         every = (
             links[c.link][INERTIAL.index(c.kind)] if c.kind in INERTIAL else own[c.name]
             for c in self.columns
@@ -278,10 +323,10 @@ class _PhysicalProblem:
         return casadi.vertcat(*every)
 
 
-def _triangle(x: SX) -> SX:
-    """Return a triangular factor L (4, 4) from ten numbers x (10, 1).
+def _cholesky_factor(x: SX) -> SX:
+    """Return the lower triangular factor L (4, 4) of log-Cholesky variables x (10, 1).
 
-    They are the logarithms of its diagonal, then the other elements row by row.
+    They are the logarithms of its diagonal, then the elements below it, row by row.
     """
     L = SX(4, 4)
     for k in range(4):
@@ -292,12 +337,20 @@ def _triangle(x: SX) -> SX:
 
 
 def _divergence(x: SX) -> SX:
-    """Return tr(P0^-1 P) - log det(P0^-1 P) - 4, which is zero if P is the guess P0."""
-    return casadi.sumsqr(_triangle(x)) - 2 * casadi.sum1(x[:4]) - 4
+    """Return the entropic divergence of a pseudo-inertia P from the guess P0, for variables x.
+
+    With log-Cholesky variables x (10, 1), it is tr(P0^-1 P) - log det(P0^-1 P) - 4, zero for P =
+    P0.
+    """
+    return casadi.sumsqr(_cholesky_factor(x)) - 2 * casadi.sum1(x[:4]) - 4
 
 
 def _guessed_roots(columns: Sequence[Column], guess: npt.ArrayLike | None) -> dict[int, Array]:
-    """Return for each link a matrix C with C C' equal to the pseudo-inertia of the guess."""
+    """Return a matrix C (4, 4) for each link number, with C C' the pseudo-inertia of the guess.
+
+    `guess` (k,) is in the order of the columns; None means a ball of 1 kg. Raises ModelError if it
+    is not physically consistent.
+    """
     if guess is None:
         ball = np.diag([np.sqrt(_MASS / 5) * _RADIUS] * 3 + [np.sqrt(_MASS)])
         return {link: ball for link in whole_links(columns)}
@@ -319,13 +372,16 @@ def _guessed_roots(columns: Sequence[Column], guess: npt.ArrayLike | None) -> di
 
 
 def _covariance(misfit: Misfit, columns: Sequence[Column], values: Array, emphasis: float) -> Array:
-    """Return the inverse Hessian of misfit and divergence in the parameters."""
+    """Return the covariance (k, k): inverse Hessian of misfit and weighted divergence at `values`.
+
+    `emphasis` is the weight of the divergence.
+    """
     H = misfit.R.T @ misfit.R
     at = {(column.kind, column.link): k for k, column in enumerate(columns)}
     for link, P in pseudo_inertias(columns, values).items():
         inverse = np.linalg.inv(P)
         indices = [at[kind, link] for kind in INERTIAL]
-        units = [inverse @ _unit(k) for k in range(10)]
+        units = [inverse @ _pseudo_inertia_unit(k) for k in range(10)]
         H[np.ix_(indices, indices)] += emphasis * np.array(
             [[np.trace(X @ Y) for Y in units] for X in units]
         )
@@ -334,20 +390,23 @@ def _covariance(misfit: Misfit, columns: Sequence[Column], values: Array, emphas
     return np.asarray(covariance / np.outer(size, size), dtype=float)
 
 
-def _unit(k: int) -> Array:
-    """Return the pseudo-inertia (4, 4) of unit inertial parameter k, the others zero."""
+def _pseudo_inertia_unit(k: int) -> Array:
+    """Return the derivative (4, 4) of the pseudo-inertia with respect to inertial parameter k.
+
+    k is the index in XX XY XZ YY YZ ZZ MX MY MZ M.
+    """
     ten = SX(DM([float(k == n) for n in range(10)]))
-    return _numbers(_matrix(PseudoInertia.of(Inertia.from_parameters(ten))))
+    return _constant_array(_body_pseudo_inertia(PseudoInertia.of(Inertia.from_parameters(ten))))
 
 
-def _matrix(body: PseudoInertia) -> SX:
+def _body_pseudo_inertia(body: PseudoInertia) -> SX:
     """Return the pseudo-inertia (4, 4) of a body."""
     upper = casadi.horzcat(body.S, body.ms)
     return casadi.densify(casadi.vertcat(upper, casadi.horzcat(body.ms.T, body.m)))
 
 
-def _numbers(value: Any) -> Array:
-    """Return a constant expression as a NumPy array."""
+def _constant_array(value: Any) -> Array:
+    """Return a constant CasADi expression `value` as a NumPy array of the same shape."""
     return np.asarray(DM(value).full(), dtype=float)
 
 
@@ -375,7 +434,7 @@ def body_values(system: System, columns: Sequence[Column], values: Array) -> tup
     """Return the mass properties of every moving body, at the default values of the symbols.
 
     Args:
-        system: system of the bodies.
+        system: system of the bodies; its symbols have their default values.
         columns: parameters, with all ten inertial parameters of the links.
         values: (k,) values of the columns, with positive masses.
     """
@@ -394,7 +453,13 @@ def body_values(system: System, columns: Sequence[Column], values: Array) -> tup
 
 
 def bodies_table(system: System, columns: Sequence[Column], values: Array) -> str:
-    """Return the mass properties of `body_values` as a text table, in kg, m and kg m2."""
+    """Return the mass properties of `body_values` as a text table, in kg, m and kg m2.
+
+    Args:
+        system: system of the bodies.
+        columns: parameters, with all ten inertial parameters of the links.
+        values: (k,) values of the columns, with positive masses.
+    """
     rows = body_values(system, columns, values)
     width = max([len("body"), *(len(row.name) for row in rows)])
     heads = ("mass", "x", "y", "z", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
@@ -409,7 +474,7 @@ def bodies_table(system: System, columns: Sequence[Column], values: Array) -> st
 
 
 def _pose(system: System, frame: str | int) -> Array:
-    """Return the pose (4, 4) of a frame relative to its link."""
+    """Return the pose (4, 4) of `frame` relative to its link, at the default parameter values."""
     pose = system.frame(frame)[1].matrix
     at = Function("pose", [system.p], [pose])(DM(system.parameter_values()))
     return np.asarray(DM(at).full(), dtype=float)
@@ -452,30 +517,44 @@ def physically_consistent(
     error = unconstrained_error(observations)
     freedom = max(error.size - observations.W.shape[2], 1)
     deviation = float(np.linalg.norm(error)) / np.sqrt(freedom)
-    weights = np.full(error.shape[1], 1 / _positive(deviation, observations.y))
-    return _with_weights(observations, weights, prior or Prior(), watch)
+    weights = np.full(error.shape[1], 1 / _above_floor(deviation, observations.y))
+    return _consistent_estimate(observations, weights, prior or Prior(), watch)
 
 
 def consistent_weighted(
     observations: Observations, prior: Prior | None = None, watch: Watch | None = None
 ) -> Estimate:
-    """Estimate as `physically_consistent`, with each effort weighted by its own error deviation.
+    """Estimate a physically consistent full parameter set, with each effort weighted separately.
+
+    It differs from `physically_consistent` only in the weights: the inverse standard deviation of
+    the residuals of each effort.
 
     Args:
         observations: observations in the full parameter set.
         prior: guess and bounds; `Prior()` if None.
         watch: progress callback; its argument is the completed fraction, between 0 and 1.
+
+    Raises:
+        ModelError: a rotor inertia or friction parameter is not observable, or the parameter set is
+            not complete.
+        SolverError: the optimisation did not converge.
     """
     error = unconstrained_error(observations)
     rms = np.sqrt(np.mean(error**2, axis=0))
     weights = np.array(
-        [1 / _positive(float(x), y) for x, y in zip(rms, observations.y.T, strict=True)]
+        [1 / _above_floor(float(x), y) for x, y in zip(rms, observations.y.T, strict=True)]
     )
-    return _with_weights(observations, weights, prior or Prior(), watch)
+    return _consistent_estimate(observations, weights, prior or Prior(), watch)
 
 
 def unconstrained_error(observations: Observations) -> Array:
-    """Return the least-squares residual (n, m) of the efforts, also for dependent columns."""
+    """Return the residual (n, m) [N m or N] of unconstrained least squares.
+
+    Columns may be linearly dependent.
+
+    Args:
+        observations: equations y = W K.
+    """
     W, y = observations.rows
     lengths = np.linalg.norm(W, axis=0)
     x = np.linalg.lstsq(W / np.where(lengths > 0, lengths, 1.0), y, rcond=_RANK)[0]
@@ -483,15 +562,23 @@ def unconstrained_error(observations: Observations) -> Array:
     return np.asarray(error.reshape(observations.y.shape), dtype=float)
 
 
-def _positive(deviation: float, efforts: Array) -> float:
-    """Return the deviation, or a small fraction of the efforts if the equations fit exactly."""
+def _above_floor(deviation: float, efforts: Array) -> float:
+    """Return `deviation`, but at least a small fraction of the rms of `efforts` [N m or N].
+
+    Equations that fit exactly would otherwise get infinite weights.
+    """
     return max(deviation, _EXACT * float(np.sqrt(np.mean(efforts**2))), _NO_DEVIATION)
 
 
-def _with_weights(
+def _consistent_estimate(
     observations: Observations, weights: Array, prior: Prior, watch: Watch | None
 ) -> Estimate:
-    """Return the estimate of physically consistent bodies for given weights of the equations."""
+    """Return the physically consistent estimate for the weights (m,) of the efforts.
+
+    Raises ModelError if a joint parameter is not observable.
+
+    `prior` is the guess with mass bounds, `watch` the progress callback.
+    """
     unseen = set(excitation_quality(observations).unseen)
     hidden = [c.name for c in observations.columns if c.kind not in INERTIAL and c.name in unseen]
     if hidden:
@@ -502,7 +589,7 @@ def _with_weights(
     W, y = observations.rows
     w = np.broadcast_to(weights, observations.y.shape).reshape(-1)
     misfit = Misfit.of_rows(W * w[:, None], y * w)
-    values, covariance = likeliest(misfit, observations.columns, prior, watch)
+    values, covariance = penalised_minimum(misfit, observations.columns, prior, watch)
     method, error = "physically consistent", observations.y - observations.W @ values
     repeated = weights * np.sqrt(repetition(error) - 1)
     spread = (W * np.broadcast_to(repeated, error.shape).reshape(-1, 1)) @ covariance
@@ -569,6 +656,6 @@ def full_parameters(
     correlation = estimate.covariance / np.outer(deviations, deviations)
     root = np.linalg.inv(np.linalg.cholesky(correlation)) / deviations
     data = Misfit(root @ matrix, root @ estimate.values)
-    values, covariance = likeliest(data, columns, prior or Prior())
+    values, covariance = penalised_minimum(data, columns, prior or Prior())
     misfit = (matrix @ values - estimate.values) / deviations
     return FullSet(tuple(columns), values, covariance, estimate.names, misfit)

@@ -16,13 +16,19 @@ def entries() -> tuple[Entry, ...]:
     return _ENTRIES
 
 
-def _grouping(system: System, method: str, moving_base: bool) -> Function:
-    """Return the function ``base_parameters(K) -> K_base`` of a system; see `base_parameters`."""
+def _base_function(system: System, method: str, moving_base: bool) -> Function:
+    """Return the Function ``base_parameters(K) -> K_base``; see `base_parameters`.
+
+    The arguments are those of `base_parameters`.
+    """
     return base_parameters(system, method, moving_base=moving_base).function
 
 
-def _set(system: System, method: str, moving_base: bool) -> str:
-    """Return the base parameters as text."""
+def _base_text(system: System, method: str, moving_base: bool) -> str:
+    """Return the base parameters as text for the menu entry; see `base_parameters`.
+
+    The arguments are those of `base_parameters`.
+    """
     return base_parameters(system, method, moving_base=moving_base).text() + "\n"
 
 
@@ -33,8 +39,8 @@ _ENTRIES = (
         "Base inertial parameters",
         "K_b = beta(K)",
         (choice("method", "method", *METHODS), MOVING_BASE),
-        _grouping,
-        _set,
+        _base_function,
+        _base_text,
     ),
     Entry(
         "dynamic-identification",

@@ -62,7 +62,12 @@ class NamedValues:
 
 
 def percent_of(values: Array, covariance: Array) -> Array:
-    """Return standard deviations (k,) in percent of the values; infinite for a value of zero."""
+    """Return standard deviations (k,) in percent of the values.
+
+    Args:
+        values: (k,) parameters; a value of zero gives infinity.
+        covariance: (k, k) covariance of the parameters.
+    """
     sizes = np.abs(values)
     share = 100 * np.sqrt(np.diag(covariance)) / np.where(sizes > 0, sizes, 1.0)
     return np.asarray(np.where(sizes > 0, share, np.inf), dtype=float)
@@ -112,7 +117,7 @@ class Residuals:
 
     @property
     def repetition(self) -> Array:
-        """Number (m,) of correlated rows per independent row; see `repetition`."""
+        """Number (m,) of correlated rows with the information of one independent row."""
         return repetition(self.error)
 
     @property
@@ -181,7 +186,10 @@ class Estimate(NamedValues):
         return self.residuals_on(self.observations)
 
     def residuals_on(self, observations: Observations) -> Residuals:
-        """Return the residuals on other observations, such as a part that was held out.
+        """Return the residuals of these parameters on other observations, such as validation data.
+
+        Args:
+            observations: equations in the same parameters, in the same order.
 
         Raises:
             ModelError: the observations have other parameters.
@@ -214,6 +222,9 @@ def holdout_residuals(
         estimator: estimation method.
         observations: observations of the whole record.
         part: fraction of the duration that is used for the estimation.
+
+    Returns:
+        Residuals at the instants after that fraction.
     """
     known, unknown = observations.split(part)
     return estimator(known).residuals_on(unknown)
@@ -226,6 +237,12 @@ def cross_validated(estimator: Estimator, observations: Observations, count: int
         estimator: estimation method.
         observations: observations of the whole record.
         count: number of parts, at least two.
+
+    Returns:
+        Residuals at all instants of the record.
+
+    Raises:
+        ModelError: `count` is less than two.
     """
     if count < 2:
         raise ModelError(f"cross-validation: the record is cut into {count} parts; give 2 or more")

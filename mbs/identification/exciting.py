@@ -51,9 +51,13 @@ _POWER = 8
 
 
 def log_det(G: Array) -> tuple[float, Array]:
-    """Return -log det(G)/n for G = W'W, and its gradient.
+    """Return -log det(G)/n and its gradient (n, n), as a criterion of excitation.
 
     It is the mean logarithm of the parameter variances. A change of units adds a constant only.
+
+    Args:
+        G: (n, n) Gram matrix W'W of the observation matrix. If it is not positive definite, value
+            and gradient are NaN.
     """
     size = np.sqrt(np.maximum(np.diag(G), NONZERO))
     values, vectors = np.linalg.eigh(G / np.outer(size, size))
@@ -64,10 +68,14 @@ def log_det(G: Array) -> tuple[float, Array]:
 
 
 def condition(G: Array) -> tuple[float, Array]:
-    """Return a smooth bound of the logarithm of the condition number of W, and its gradient in G.
+    """Return a smooth upper bound of log(cond(W)) and its gradient (n, n) in G.
 
-    The largest eigenvalue of G = W'W is replaced by a high-order norm of all eigenvalues, and the
-    smallest by the same norm of their inverses, which gives an upper bound.
+    The largest eigenvalue of G is replaced by a high-order norm of all eigenvalues, and the
+    smallest by the same norm of their inverses.
+
+    Args:
+        G: (n, n) Gram matrix W'W of the observation matrix. If it is not positive definite, value
+            and gradient are NaN.
     """
     values, vectors = np.linalg.eigh(G)
     if values[0] <= 0:
@@ -79,7 +87,14 @@ def condition(G: Array) -> tuple[float, Array]:
 
 
 def scaled_condition(G: Array) -> tuple[float, Array]:
-    """Return `condition` for columns of W of unit length, which is independent of units."""
+    """Return `condition` for columns of W scaled to unit length, which is independent of units.
+
+    Args:
+        G: (n, n) Gram matrix W'W of the observation matrix.
+
+    Returns:
+        Value, and its gradient (n, n) in G.
+    """
     size = np.sqrt(np.maximum(np.diag(G), NONZERO))
     S = G / np.outer(size, size)
     value, slope = condition(S)
@@ -96,7 +111,7 @@ CRITERIA: Mapping[str, Criterion] = {
 
 
 class CriterionFunction(casadi.Callback):
-    """CasADi callback ``criterion(G) -> f`` with the exact gradient of the criterion.
+    """CasADi callback ``criterion(G) -> f`` of a Gram matrix G (n, n), with its exact gradient.
 
     Keep a reference to it for as long as a Function that contains it is used.
     """
@@ -105,7 +120,7 @@ class CriterionFunction(casadi.Callback):
         casadi.Callback.__init__(self)
         self._criterion = criterion
         self._n = n
-        self._slopes: list[_Slope] = []
+        self._slopes: list[_CriterionGradient] = []
         self.construct("criterion", {})
 
     def get_n_in(self) -> int:
@@ -125,7 +140,7 @@ class CriterionFunction(casadi.Callback):
         return Sparsity.dense(1, 1)
 
     def eval(self, arguments: Sequence[DM]) -> list[DM]:
-        """Evaluate the criterion."""
+        """Return the value of the criterion for the Gram matrix in `arguments`."""
         return [DM(self._criterion(np.array(arguments[0]))[0])]
 
     def has_jacobian(self) -> bool:
@@ -133,13 +148,13 @@ class CriterionFunction(casadi.Callback):
         return True
 
     def get_jacobian(self, name: str, *_: Any) -> casadi.Function:
-        """Return a callback for the gradient as one row (1, n^2)."""
-        self._slopes.append(_Slope(self._criterion, self._n, name))
+        """Return a callback of (G, f) for the gradient as one row (1, n^2), with this name."""
+        self._slopes.append(_CriterionGradient(self._criterion, self._n, name))
         return self._slopes[-1]
 
 
-class _Slope(casadi.Callback):
-    """``(G, f) -> df/dG`` (1, n^2)."""
+class _CriterionGradient(casadi.Callback):
+    """CasADi callback ``(G, f) -> df/dG`` (1, n^2): gradient of a criterion of G (n, n)."""
 
     def __init__(self, criterion: Criterion, n: int, name: str) -> None:
         casadi.Callback.__init__(self)
@@ -174,9 +189,10 @@ _OUTPUTS = ("x", "f", "g", "lam_x", "lam_g", "lam_p")
 
 
 class SolverFollower(casadi.Callback):
-    """Iteration callback of the solver that reports progress.
+    """Iteration callback of a CasADi nlpsol solver that reports the progress of the optimisation.
 
-    Keep a reference to it for as long as the solver is used.
+    Keep a reference to it for as long as the solver is used. `watch` is called with the completed
+    fraction of `most` iterations.
     """
 
     def __init__(
@@ -234,7 +250,7 @@ as zero. Rounding errors of sines are 1e-16; the smallest nonzero elements are f
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SearchEnd:
+class OptimisationEnd:
     """Result of an optimisation.
 
     Attributes:
@@ -281,18 +297,21 @@ class Programme:
         return int(self.instant.size1_in(0))
 
     def series(self, x: Array) -> FourierSeries:
-        """Return the Fourier series of the variables x."""
+        """Return the Fourier series of the programme variables x (m (2 harmonics - 1),)."""
         m, H = self.joints, self.harmonics
         Y = x[m:].reshape(m, 2 * H - 2) @ resting_coefficients(self.period, H).T
         return FourierSeries(self.period, x[:m], Y[:, :H], Y[:, H:])
 
     def start(self, rng: np.random.Generator) -> Array:
-        """Return the variables of the best random motion within the ranges of the joints.
+        """Return the variables of the best of 30 random motions within the ranges of the joints.
+
+        Args:
+            rng: random number generator.
 
         Raises:
             SolverError: no random motion gives observations of full column rank.
         """
-        rates, value_at = self._rates(), self._evaluation()
+        rates, value_at = self._motion_matrix(), self._evaluation()
         found: list[tuple[float, Array]] = []
         for k in range(_STARTS):
             x = self._random(rates, _FILLED * 0.5 ** (k % 3), rng)
@@ -307,7 +326,10 @@ class Programme:
         return min(found, key=lambda pair: pair[0])[1]
 
     def _random(self, rates: Array, filled: float, rng: np.random.Generator) -> Array:
-        """Return the variables of a random motion that uses the fraction `filled` of the ranges."""
+        """Return the variables of a random motion over the fraction `filled` of the joint ranges.
+
+        `rates` is the matrix of `_motion_matrix`.
+        """
         m = self.joints
         lower, upper = self._ranges(1.0)
         middle = (lower[:m] + upper[:m]) / 2
@@ -319,12 +341,13 @@ class Programme:
 
     def improve(
         self, x: Array, tightened: Array, rounds: int, watch: Watch | None = None
-    ) -> SearchEnd:
+    ) -> OptimisationEnd:
         """Minimise the criterion within the limits.
 
         Args:
             x: variables of the initial guess.
-            tightened: (r,) reduction of the ranges of model quantities at each end.
+            tightened: (r,) reduction of the ranges of efforts, passive positions and planes at each
+                end, in the units of the limits.
             rounds: maximum number of iterations.
             watch: progress callback; its argument is the completed fraction of the iterations.
 
@@ -333,7 +356,7 @@ class Programme:
         """
         variables, W, bounded = self._graph()
         criterion = CriterionFunction(self.criterion, W.shape[0])
-        rates = self._bounded_rates()
+        rates = self._limited_motion_rows()
         rows, ends = self._bounded_models(tightened)
         g = casadi.vertcat(_product(rates[0], variables), casadi.vec(bounded[rows, :]))
         scale = np.concatenate([rates[2] - rates[1], np.tile(_spans(ends), self.samples)])
@@ -346,7 +369,7 @@ class Programme:
         answer = solver(x0=x, lbg=lower, ubg=upper)
         status = solver.stats()
         reached = np.array(answer["g"]).ravel()
-        return SearchEnd(
+        return OptimisationEnd(
             np.array(answer["x"]).ravel(),
             float(answer["f"]),
             float(np.maximum(lower - reached, reached - upper).max()),
@@ -355,9 +378,11 @@ class Programme:
         )
 
     def _graph(self) -> tuple[MX, MX, MX]:
-        """Return the variables, W' (k, m samples) and bounded model quantities (r, samples)."""
+        """Return variables, W' (k, m samples) and limited model quantities (r, samples) as MX."""
         variables = MX.sym("x", self.joints * (2 * self.harmonics - 1))
-        moved = casadi.reshape(_product(self._rates(), variables), self.samples, 3 * self.joints).T
+        moved = casadi.reshape(
+            _product(self._motion_matrix(), variables), self.samples, 3 * self.joints
+        ).T
         q, v, a = casadi.vertsplit(moved, self.joints)
         W, bounded = self.instant.map(self.samples)(q, v, a)
         return variables, W, bounded
@@ -368,7 +393,7 @@ class Programme:
         gram = Function("gram", [variables], [W @ W.T])
         return lambda x: self.criterion(np.array(gram(x)))[0]
 
-    def _rates(self) -> Array:
+    def _motion_matrix(self) -> Array:
         """Return the matrix (3 m samples, variables) that maps variables to q, v and a."""
         m, H = self.joints, self.harmonics
         t = np.arange(self.samples) * self.period / self.samples
@@ -382,27 +407,31 @@ class Programme:
         return np.vstack(blocks)
 
     def _ranges(self, part: float) -> tuple[Array, Array]:
-        """Return the lower and upper ends (3 m,) of the ranges of q, v and a.
+        """Return the lower and upper limits (3 m,) of q, v and a; infinite without a limit.
 
-        The ranges are scaled about their middles by the factor `part`.
+        Finite ranges are scaled about their middles by the factor `part`.
         """
         ends = np.array([(limit.lower, limit.upper) for limit in self.limits.of_rates])
         limited = np.isfinite(ends).all(axis=1)
         half = np.where(limited[:, None], ends, 0.0).sum(axis=1) / 2
         return half + part * (ends[:, 0] - half), half + part * (ends[:, 1] - half)
 
-    def _bounded_rates(self) -> tuple[Array, Array, Array]:
-        """Return the limited rows of `_rates` and the ends of their ranges.
+    def _limited_motion_rows(self) -> tuple[Array, Array, Array]:
+        """Return the limited rows of `_motion_matrix`, with their lower and upper limits.
 
         The ranges are reduced so that the limits also hold between samples.
         """
         lower, upper = self._ranges(between_samples(self.samples, self.harmonics))
         limited = np.repeat(np.isfinite(lower) & np.isfinite(upper), self.samples)
         first, last = (np.repeat(x, self.samples)[limited] for x in (lower, upper))
-        return self._rates()[limited], first, last
+        return self._motion_matrix()[limited], first, last
 
     def _bounded_models(self, tightened: Array) -> tuple[list[int], Array]:
-        """Return the indices of the limited model quantities and their ranges (rows, 2)."""
+        """Return indices and ranges (rows, 2) of the limited quantities of models.
+
+        These are efforts, passive positions and planes. Both ends of each range are reduced by
+        `tightened` (r,).
+        """
         every: tuple[MotionLimit, ...] = self.limits.of_models
         rows = [k for k, limit in enumerate(every) if limit.is_finite]
         ends = [(every[k].lower + tightened[k], every[k].upper - tightened[k]) for k in rows]
@@ -410,7 +439,10 @@ class Programme:
 
 
 def _product(A: Array, x: MX) -> MX:
-    """Return A x as a dense vector, including rows of A that are zero (velocities at rest)."""
+    """Return A x as a dense column; elements of A that are rounding errors count as zero.
+
+    Rows of A that are entirely zero (velocities at rest) remain in the result.
+    """
     sizes = np.abs(A)
     structure = np.where(sizes > _ROUNDING * sizes.max(axis=0, initial=0.0), A, 0.0)
     product: MX = casadi.densify(casadi.sparsify(DM(structure)) @ x)
@@ -418,7 +450,7 @@ def _product(A: Array, x: MX) -> MX:
 
 
 def _spans(ends: Array) -> Array:
-    """Return the widths (rows,) of ranges; 1 for ranges that are open on one side."""
+    """Return widths (rows,) of ranges `ends` (rows, 2); 1 for ranges that are open on one side."""
     span = ends[:, 1] - ends[:, 0]
     return np.where(np.isfinite(span), span, 1.0)
 
@@ -556,22 +588,26 @@ def excitation(
         effort=effort,
         planes=planes,
     )
-    form = _form(series)
+    form = _settings(series)
     chosen = _columns(system, columns)
-    smooth = _smooth(system, limits, form)
+    smooth = _with_smooth_friction(system, limits, form)
     function = instant(smooth, chosen, limits)
     programme = Programme(
         form.period, form.harmonics, form.samples, function, CRITERIA[objective], limits
     )
-    measured = partial(_measure, system, chosen, programme)
+    measured = partial(_measured_trajectory, system, chosen, programme)
     steps = _FIRST_ROUNDS * (starts if starts > 1 else 0)
     with progress(f"{system.name}: excitation", 0.0, steps + rounds, quiet=quiet) as reached:
-        x = _best(programme, np.random.default_rng(seed), starts, reached)
-        found = _within(programme, measured, x, rounds, lambda part: reached(steps + part * rounds))
+        x = _best_start(programme, np.random.default_rng(seed), starts, reached)
+        found = _limited_motion(
+            programme, measured, x, rounds, lambda part: reached(steps + part * rounds)
+        )
     return replace(found, objective=objective)
 
 
-def _best(programme: Programme, rng: np.random.Generator, starts: int, reached: Watch) -> Array:
+def _best_start(
+    programme: Programme, rng: np.random.Generator, starts: int, reached: Watch
+) -> Array:
     """Return the variables of the random motion with the best result of a short optimisation.
 
     Args:
@@ -591,14 +627,20 @@ def _best(programme: Programme, rng: np.random.Generator, starts: int, reached: 
     return min(found, key=lambda answer: (answer.violation > _ALLOWED, answer.value)).x
 
 
-def _within(
+def _limited_motion(
     programme: Programme,
     measured: Callable[[Array], Trajectory],
     x: Array,
     rounds: int,
     watch: Watch,
 ) -> Trajectory:
-    """Return the optimal motion near x, with limits of efforts and planes also between samples."""
+    """Return the optimal motion near the variables x that keeps all limits also between samples.
+
+    Limits that `measured` (variables -> Trajectory) finds exceeded are tightened and the
+    optimisation is repeated. Raises SolverError if this does not succeed.
+
+    `rounds` is the maximum number of iterations, `watch` the progress callback.
+    """
     narrowed = np.zeros(len(programme.limits.of_models))
     fixed = len(programme.limits.of_rates)
     for _ in range(_TRIES):
@@ -617,10 +659,15 @@ def _within(
     )
 
 
-def _measure(
+def _measured_trajectory(
     system: System, columns: tuple[Column, ...], programme: Programme, x: Array
 ) -> Trajectory:
-    """Return the motion with condition numbers and margins, computed without smoothing."""
+    """Return the motion of the variables x with its condition numbers and margins.
+
+    They are evaluated at instants eight times as dense as the samples, without smoothed friction.
+
+    `programme` maps x to the motion; `columns` are the parameters to identify.
+    """
     motion, limits = programme.series(x), programme.limits
     exact = instant(system, columns, limits)
     n = _FINE * programme.samples
@@ -647,7 +694,7 @@ def _measure(
     )
 
 
-def _form(series: FourierSettings | None) -> FourierSettings:
+def _settings(series: FourierSettings | None) -> FourierSettings:
     """Return the settings of the Fourier series; defaults for None. Raise for a wrong type."""
     if series is None:
         return FourierSettings()
@@ -662,7 +709,10 @@ def _form(series: FourierSettings | None) -> FourierSettings:
 def _columns(
     system: System, columns: BaseParameters | Sequence[Column] | None
 ) -> tuple[Column, ...]:
-    """Return the parameters to identify; the base parameters for None."""
+    """Return the parameters to identify: `columns`, or the base parameters of the system for None.
+
+    Raises ModelError for an empty selection or an element that is no Column.
+    """
     if columns is None:
         return tuple(base_parameters(system).kept)
     chosen = tuple(columns if isinstance(columns, Sequence) else columns.kept)
@@ -672,8 +722,12 @@ def _columns(
     return chosen
 
 
-def _smooth(system: System, limits: MotionLimits, form: FourierSettings) -> System:
-    """Return a copy of the system with the sign of Coulomb friction smoothed."""
+def _with_smooth_friction(system: System, limits: MotionLimits, form: FourierSettings) -> System:
+    """Return a copy of the system in which Coulomb friction changes its sign continuously.
+
+    The width of the transition is a fraction of the largest velocity of each joint, from `limits`
+    or, without a limit, from the position range and the period in `form`.
+    """
     widths = {}
     rows = zip(system.active, limits.position, limits.velocity, strict=True)
     for k, position, velocity in rows:
@@ -703,6 +757,6 @@ def _check(system: System, objective: str, starts: int, rounds: int) -> None:
 
 
 def _condition(W: Array) -> float:
-    """Return the condition number of W."""
+    """Return the condition number of the matrix W: its largest over its smallest singular value."""
     values = np.linalg.svd(W, compute_uv=False)
     return float(values[0] / values[-1])

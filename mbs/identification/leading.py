@@ -30,19 +30,19 @@ _LARGEST = 8
 
 
 def leads_of(system: System, q: Array) -> Array:
-    """Return `leads` of `configuration_report` at q (n, nq), negative beyond a singularity.
+    """Return the signed distance from singular configurations at q, negative beyond a singularity.
 
-    Its magnitude measures how well the independent joints determine the passive joints: 1 is best,
-    0 is singular. Its sign is that of det(J_p) relative to the assembled configuration, where J_p
-    is the passive columns of the closure Jacobian. The value has no sign if the choice of rows
-    varies with the configuration.
+    Its magnitude is `leads` of `configuration_report`: it measures how well the independent joints
+    determine the passive joints; 1 is best, 0 is singular. Its sign is that of det(J_p) relative to
+    the assembled configuration, where J_p is the passive columns of the closure Jacobian. The value
+    is never negative if the choice of rows varies with the configuration.
 
     Args:
         system: closed system, at the default values of its parameters.
         q: (n, nq) positions [rad or m].
 
     Returns:
-        (n,) signed values.
+        (n,) signed values without unit.
     """
     n, p = len(q), DM(system.parameter_values())
     leads = np.asarray(configuration_health(system).map(n)(DM(q.T), p)[1]).ravel()
@@ -50,14 +50,17 @@ def leads_of(system: System, q: Array) -> Array:
     if system.closure.varies:
         return leads
     size = len(system.closure.passive)
-    rows = np.asarray(_passive_rows(system).map(n)(DM(q.T), p)).T.reshape(n, size, size)
+    rows = np.asarray(_passive_closure_columns(system).map(n)(DM(q.T), p)).T.reshape(n, size, size)
     return np.asarray(leads * np.linalg.slogdet(rows)[0] * _usual_sign(system), dtype=float)
 
 
 def signed_leads(system: System) -> Function:
-    """Return the Function ``leads(q)`` of `leads_of`, for use in an optimisation.
+    """Return Function ``leads(q)``: signed distance from singular configurations, see `leads_of`.
 
-    The value has no sign if there are more than 8 passive joints.
+    The value is never negative if there are more than 8 passive joints.
+
+    Args:
+        system: closed system, at the default values of its parameters.
     """
 
     def build() -> Function:
@@ -66,7 +69,7 @@ def signed_leads(system: System) -> Function:
         assert system.closure is not None
         size = len(system.closure.passive)
         if not system.closure.varies and size <= _LARGEST:
-            rows = casadi.reshape(_passive_rows(system)(q, p), size, size)
+            rows = casadi.reshape(_passive_closure_columns(system)(q, p), size, size)
             value = value * casadi.sign(_determinant(rows)) * _usual_sign(system)
         return Function("leads", [q], [value], {"cse": True})
 
@@ -75,9 +78,13 @@ def signed_leads(system: System) -> Function:
 
 
 def regular(system: System, q: Array) -> npt.NDArray[np.bool_]:
-    """Return a mask (n,) of the configurations that are not close to singular ones.
+    """Return a mask (n,) of the configurations of a motion that are not close to singular ones.
 
     Both samples of a step that crosses a singularity are False.
+
+    Args:
+        system: closed system, at the default values of its parameters.
+        q: (n, nq) positions [rad or m] in the order of time.
     """
     leads = leads_of(system, q)
     good = np.abs(leads) > REGULAR
@@ -88,16 +95,19 @@ def regular(system: System, q: Array) -> npt.NDArray[np.bool_]:
 
 
 def _usual_sign(system: System) -> float:
-    """Return the sign of the determinant at the assembled configuration."""
+    """Return the sign of det(J_p) at the assembled configuration: 1.0 or -1.0, see `leads_of`."""
     rows = np.asarray(
-        _passive_rows(system)(DM(system.configuration), DM(system.parameter_values()))
+        _passive_closure_columns(system)(DM(system.configuration), DM(system.parameter_values()))
     )
     size = round(rows.size**0.5)
     return float(np.linalg.slogdet(rows.reshape(size, size))[0]) or 1.0
 
 
-def _passive_rows(system: System) -> Function:
-    """Return (q, p) -> (r r, 1): passive columns of the closure Jacobian, stacked by columns."""
+def _passive_closure_columns(system: System) -> Function:
+    """Return the Function (q, p) -> (r r, 1): columns of the r passive joints in the Jacobian.
+
+    The Jacobian is that of r independent closure rows; the result is its column-major vector.
+    """
 
     def build() -> Function:
         q = SX.sym("q", system.nq)
@@ -110,7 +120,7 @@ def _passive_rows(system: System) -> Function:
 
 
 def _determinant(A: SX) -> SX:
-    """Return det(A) by the method of Faddeev and Le Verrier, without division by elements."""
+    """Return det(A) by the Faddeev-Le Verrier method, without division by elements of A."""
     n = A.shape[0]
     M, c = SX.eye(n), SX(1)
     for k in range(1, n + 1):
@@ -125,6 +135,9 @@ def _determinant(A: SX) -> SX:
 
 def active_indices(system: System) -> list[int]:
     """Return the indices in q of the independent joints, in the order of `system.active`.
+
+    Args:
+        system: open or closed.
 
     Raises:
         ModelError: an independent velocity is not the derivative of one position.
@@ -154,12 +167,12 @@ def configuration_of(system: System, q_a: MX) -> MX:
     p = DM(system.parameter_values())
     if is_explicit(system):
         inputs = [q_a, p] if system.parameters else [q_a]
-        return _near_configuration(system, MX(Function.__call__(closed_form(system), *inputs)))
+        return _unwrapped_configuration(system, MX(Function.__call__(closed_form(system), *inputs)))
     return MX(follow_active(system)(q_a, p))
 
 
-def _near_configuration(system: System, q: MX) -> MX:
-    """Shift passive angles by full turns to within half a turn of the assembled configuration.
+def _unwrapped_configuration(system: System, q: MX) -> MX:
+    """Shift the passive angles in q (nq, 1) by full turns, to within half a turn of the assembly.
 
     Closed forms return angles between -pi and pi, which would jump within a motion.
     """
@@ -171,7 +184,7 @@ def _near_configuration(system: System, q: MX) -> MX:
     return MX(casadi.vertcat(*rows))
 
 
-def of_motion(model: Any) -> Function:
+def motion_function(model: Any) -> Function:
     """Return a model as a Function of the motion only, with parameters at their default values.
 
     Args:
@@ -198,7 +211,13 @@ def of_motion(model: Any) -> Function:
 
 
 def is_explicit(system: System) -> bool:
-    """Whether the loops close without iteration."""
+    """Whether the positions of all joints follow from the independent joints without iteration.
+
+    True for open systems.
+
+    Args:
+        system: open or closed system.
+    """
     if not system.is_closed:
         return True
     try:
@@ -209,9 +228,13 @@ def is_explicit(system: System) -> bool:
 
 
 def positions(system: System, q_a: Array) -> Array:
-    """Return the positions (n, nq) of the tree for independent positions q_a (n, m).
+    """Return the positions (n, nq) of all joints of the tree that close the loops.
 
     Rows are NaN if the loops cannot close.
+
+    Args:
+        system: open or closed, at the default values of its parameters.
+        q_a: (n, m) positions of the independent joints [rad or m].
     """
     if not system.is_closed:
         return q_a

@@ -54,16 +54,20 @@ class Setting:
     prior: Prior
 
     def bodies_of(self, part: Observations) -> Estimate:
-        """Return the physically consistent estimate of all or some equations of the record."""
+        """Return the physically consistent estimate of all or some equations of the record.
+
+        `part` are equations at some of the instants of `full`.
+        """
         if self.bodies is not None and len(part.time) == len(self.full.time):
             return self.bodies
         return consistent_weighted(self.full.at(part.time), self.prior)
 
-    def moving(self, part: Observations) -> Array:
-        """Return values (k,) of the full set for a simulation of the motion.
+    def simulation_values(self, part: Observations) -> Array:
+        """Return values (k,) of the full parameter set with which the robot is simulated.
 
-        They are the values of `bodies_of`. If these do not converge, they are base parameters by
-        weighted least squares at the kept columns, which give the same efforts, and zeros.
+        They are the values of `bodies_of(part)`. If that search does not converge, they are the
+        base parameters by weighted least squares at the kept columns, which give the same efforts,
+        and zeros.
         """
         try:
             return self.bodies_of(part).values
@@ -73,11 +77,11 @@ class Setting:
             return values
 
 
-def _by_instruments(setting: Setting) -> Estimator:
-    """Return the instrumental-variable method, with instruments from a simulated motion."""
+def _instrumental_estimator(setting: Setting) -> Estimator:
+    """Return instrumental-variable estimator; the robot is simulated with the data in `setting`."""
 
     def estimator(observations: Observations) -> Estimate:
-        values = setting.moving(observations)
+        values = setting.simulation_values(observations)
         moved = [simulated_motion(setting.model, values, one) for one in setting.samples]
         whole = stacked([observe_filtered(setting.model, one) for one in moved])
         instruments = whole.grouped(setting.base)
@@ -87,8 +91,11 @@ def _by_instruments(setting: Setting) -> Estimator:
     return estimator
 
 
-def _by_bodies(setting: Setting) -> Estimator:
-    """Return the method that computes base parameters from physically consistent bodies."""
+def _bodies_estimator(setting: Setting) -> Estimator:
+    """Return the estimator of base parameters from physically consistent bodies.
+
+    `setting` contains the data of the record and the guess of the bodies.
+    """
 
     def estimator(observations: Observations) -> Estimate:
         bodies = setting.bodies_of(observations)
@@ -101,19 +108,19 @@ def _by_bodies(setting: Setting) -> Estimator:
     return estimator
 
 
-def _always(estimator: Estimator) -> Callable[[Setting], Estimator]:
+def _same_estimator(estimator: Estimator) -> Callable[[Setting], Estimator]:
     """Return a factory that returns the same estimator for all settings."""
     return lambda _: estimator
 
 
 METHODS: Mapping[str, Callable[[Setting], Estimator]] = MappingProxyType(
     {
-        "least_squares": _always(least_squares),
-        "weighted": _always(weighted),
-        "reweighted": _always(iteratively_reweighted),
-        "robust": _always(huber),
-        "instrumental": _by_instruments,
-        "consistent": _by_bodies,
+        "least_squares": _same_estimator(least_squares),
+        "weighted": _same_estimator(weighted),
+        "reweighted": _same_estimator(iteratively_reweighted),
+        "robust": _same_estimator(huber),
+        "instrumental": _instrumental_estimator,
+        "consistent": _bodies_estimator,
     }
 )
 """Estimation methods for base parameters, by name."""
@@ -167,6 +174,10 @@ def essential(
 
     Raises:
         ModelError: the estimate has no covariance, or a bound is out of range.
+
+    Returns:
+        Estimate in the remaining parameters, names of the eliminated parameters, and the reason why
+        the elimination ended.
     """
     if not (largest_percent > 0 and 0 < significance < 1):
         raise ModelError(
@@ -178,9 +189,9 @@ def essential(
             f"essential parameters: {estimate.method} has no deviations; use weighted()"
         )
     distribution = optional_module("scipy.stats", "identify").f
-    free, dropped = _freedom(estimate), list[int]()
+    free, dropped = _degrees_of_freedom(estimate), list[int]()
     while True:
-        kept, values, covariance = _without(estimate, dropped)
+        kept, values, covariance = _restricted(estimate, dropped)
         share = percent_of(values, covariance)
         worst = kept[int(np.argmax(share))]
         name, following = estimate.names[worst], [*dropped, worst]
@@ -190,7 +201,7 @@ def essential(
         if len(kept) == 1:
             reason = f"{name} is the last parameter"
             break
-        ratio = _ratio(estimate, following)
+        ratio = _f_statistic(estimate, following)
         if ratio > float(distribution.isf(significance, len(following), free)):
             reason = f"without {name} the errors grow more than noise explains (F = {ratio:.3g})"
             break
@@ -199,14 +210,14 @@ def essential(
     return Essential(_estimate(estimate, kept, values, covariance), names, reason)
 
 
-def _freedom(estimate: Estimate) -> float:
-    """Return the degrees of freedom: independent equations minus parameters, at least one."""
+def _degrees_of_freedom(estimate: Estimate) -> float:
+    """Return the degrees of freedom: independent equations minus parameters, at least 1."""
     error = estimate.residuals.error
     return max(float(np.sum(len(error) / repetition(error))) - len(estimate.values), 1.0)
 
 
-def _without(estimate: Estimate, dropped: Sequence[int]) -> tuple[list[int], Array, Array]:
-    """Return indices, values and covariance of the kept parameters if `dropped` are zero.
+def _restricted(estimate: Estimate, dropped: Sequence[int]) -> tuple[list[int], Array, Array]:
+    """Return indices, values and covariance of the other parameters if those in `dropped` are zero.
 
     Source: Draper & Smith 1998 (restricted least squares, from the covariance).
     """
@@ -219,8 +230,8 @@ def _without(estimate: Estimate, dropped: Sequence[int]) -> tuple[list[int], Arr
     return kept, values, C[np.ix_(kept, kept)] - gain @ shared.T
 
 
-def _ratio(estimate: Estimate, dropped: Sequence[int]) -> float:
-    """Return the F statistic of the hypothesis that the `dropped` parameters are zero."""
+def _f_statistic(estimate: Estimate, dropped: Sequence[int]) -> float:
+    """Return the F statistic of the hypothesis that the parameters `dropped` (indices) are zero."""
     size = estimate.deviations[dropped]
     values = estimate.values[dropped] / size
     correlation = estimate.covariance[np.ix_(dropped, dropped)] / np.outer(size, size)
@@ -230,7 +241,7 @@ def _ratio(estimate: Estimate, dropped: Sequence[int]) -> float:
 def _estimate(
     estimate: Estimate, kept: Sequence[int], values: Array, covariance: Array
 ) -> Estimate:
-    """Return the estimate of the kept ("essential") parameters only."""
+    """Return the estimate of the parameters with indices `kept` and these values and covariance."""
     names = [estimate.names[k] for k in kept]
     return Estimate(
         f"{estimate.method}, essential",

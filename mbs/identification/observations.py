@@ -14,7 +14,7 @@ from casadi import DM
 from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.identification._base_parameters import BaseParameters
-from mbs.identification.leading import of_motion, positions, regular
+from mbs.identification.leading import motion_function, positions, regular
 from mbs.identification.record import ORDER, Samples, zero_phase
 from mbs.identification.regressors import (
     Column,
@@ -43,8 +43,12 @@ _ROUNDING = 1e-9
 interval in spite of rounding. Sampling periods are a thousand times larger."""
 
 
-def led_rows(system: System, q: Array) -> Chosen:
-    """Return a mask (n,) of the configurations q (n, nq) that are not close to singular ones.
+def regular_rows(system: System, q: Array) -> Chosen:
+    """Return a mask (n,) of the configurations that are not close to singular ones.
+
+    Args:
+        system: closed system.
+        q: (n, nq) positions in the order of time [rad or m].
 
     Raises:
         ModelError: more than half of the configurations are close to singular ones.
@@ -61,8 +65,13 @@ def led_rows(system: System, q: Array) -> Chosen:
     return good
 
 
-def on_lines(values: Array, good: Chosen) -> Array:
-    """Replace the rows of values (n, ...) that are not good by linear interpolation."""
+def interpolated(values: Array, good: Chosen) -> Array:
+    """Return values with the rows that are not good replaced by linear interpolation.
+
+    Args:
+        values: (n, ...) values in the order of time.
+        good: (n,) mask of the rows that are kept.
+    """
     if good.all():
         return values
     at, known = np.arange(len(good)), np.flatnonzero(good)
@@ -72,8 +81,15 @@ def on_lines(values: Array, good: Chosen) -> Array:
     return flat.reshape(values.shape)
 
 
-def without(time: Array, bad: Array, ahead: float, back: float) -> Chosen:
-    """Return a mask (n,) of the instants without a bad instant in [time - back, time + ahead]."""
+def outside_windows(time: Array, bad: Array, ahead: float, back: float) -> Chosen:
+    """Return a mask (n,) of the instants t that have no bad instant in [t - back, t + ahead].
+
+    Args:
+        time: (n,) instants [s].
+        bad: sorted bad instants [s].
+        ahead: length of the window after an instant [s].
+        back: length of the window before an instant [s].
+    """
     first = np.searchsorted(bad, time - back * (1 + _ROUNDING), side="left")
     last = np.searchsorted(bad, time + ahead * (1 + _ROUNDING), side="right")
     return np.asarray(first == last, dtype=bool)
@@ -85,15 +101,20 @@ def without(time: Array, bad: Array, ahead: float, back: float) -> Chosen:
 _BATCH = 500
 
 
-def known_of(regressor: Any, samples: Samples) -> Array:
-    """Return the efforts (n, m) of springs and force elements without a column [N m or N]."""
+def known_efforts_at(regressor: Any, samples: Samples) -> Array:
+    """Return the efforts (n, m) of springs and force elements that have no column [N m or N].
+
+    Args:
+        regressor: Function D(q, v, a) with `.columns` and `.system`.
+        samples: motion at which the efforts are evaluated.
+    """
     system: System = regressor.system
     if not _has_elements(system):
         return np.zeros(samples.tau.shape)
     q, v, _ = motion_of(regressor, samples)
     laws = [column.symbol for column in regressor.columns if column.symbol]
     kind = "independent" if _is_reduced(regressor) else "tree"
-    known = of_motion(known_efforts(system, kind, laws))
+    known = motion_function(known_efforts(system, kind, laws))
     pairs = zip(q, v, strict=True)
     return np.array([DM(known(*state)).full()[:, 0] for state in pairs])
 
@@ -127,10 +148,15 @@ def motion_of(model: Any, samples: Samples) -> tuple[Array, Array, Array]:
     )
 
 
-def led_samples(model: Any, samples: Samples) -> npt.NDArray[np.bool_]:
+def regular_samples(model: Any, samples: Samples) -> npt.NDArray[np.bool_]:
     """Return a mask (n,) of the samples that are not close to singular configurations.
 
-    There, the independent joints of a closed system determine the motion of the other joints.
+    It is all True for an open system and for a model in tree coordinates.
+
+    Args:
+        model: model in the independent or tree coordinates of `model.system`.
+        samples: motion of all joints, or of the independent joints. Its mask `regular` is returned
+            if it is set.
 
     Raises:
         ModelError: more than half of the samples are close to singular configurations.
@@ -139,12 +165,17 @@ def led_samples(model: Any, samples: Samples) -> npt.NDArray[np.bool_]:
         return samples.regular
     if not _is_reduced(model):
         return np.ones(len(samples.time), dtype=bool)
-    return led_rows(model.system, motion_of(model, samples)[0])
+    return regular_rows(model.system, motion_of(model, samples)[0])
 
 
 def with_regular(model: Any, samples: Samples) -> Samples:
-    """Return the samples with the mask `regular` set, so that variants of the motion reuse it."""
-    return replace(samples, regular=led_samples(model, samples))
+    """Return the samples with their mask `regular` set, so that it is computed only once.
+
+    Args:
+        model: model in the independent or tree coordinates of `model.system`.
+        samples: motion of all joints, or of the independent joints.
+    """
+    return replace(samples, regular=regular_samples(model, samples))
 
 
 def _is_reduced(model: Any) -> bool:
@@ -174,7 +205,7 @@ def evaluated(model: Any, samples: Samples) -> list[Array]:
         ModelError: the widths of the samples do not match the coordinates of the model, or the
             model depends on states or inputs of components.
     """
-    along = of_motion(model)  # # measured positions do not close the loops exactly
+    along = motion_function(model)  # # measured positions do not close the loops exactly
     states = motion_of(model, samples)[: along.n_in()]
     n = len(samples.time)
     size = min(_BATCH, n)
@@ -186,7 +217,7 @@ def evaluated(model: Any, samples: Samples) -> list[Array]:
         for whole, part in zip(found, values if len(found) > 1 else [values], strict=True):
             m, k = whole.shape[1:]
             whole[rows] = np.asarray(part).reshape(m, size, k).transpose(1, 0, 2)
-    return [on_lines(whole, led_samples(model, samples)) for whole in found]
+    return [interpolated(whole, regular_samples(model, samples)) for whole in found]
 
 
 # Equations of a record: one row per instant and effort.
@@ -257,6 +288,9 @@ class Observations:
     def select(self, names: Sequence[str]) -> Observations:
         """Return the equations with only the named columns; other parameters are assumed zero.
 
+        Args:
+            names: names of parameters, in the order of the new columns.
+
         Raises:
             ModelError: a name is unknown.
         """
@@ -293,17 +327,25 @@ class Observations:
         return self._rows_of(first), self._rows_of(~first)
 
     def parts(self, count: int) -> Iterator[tuple[Observations, Observations]]:
-        """Yield, for each of `count` equal parts of the record, the other parts and that part."""
+        """Yield, for each of `count` equal parts of the record, the other parts and that part.
+
+        Args:
+            count: number of parts.
+        """
         number = np.arange(len(self.time)) * count // len(self.time)
         for k in range(count):
             yield self._rows_of(number != k), self._rows_of(number == k)
 
     def at(self, time: Array) -> Observations:
-        """Return the equations at these instants [s], which must be elements of `self.time`."""
+        """Return the equations at some of the instants.
+
+        Args:
+            time: instants [s], which must be elements of `self.time`; others are ignored.
+        """
         return self._rows_of(np.isin(self.time, time))
 
     def _rows_of(self, keep: npt.NDArray[np.bool_]) -> Observations:
-        """Return the observations of the instants of a mask (n,) only."""
+        """Return the observations of the instants at which the mask `keep` (n,) is True."""
         return replace(self, time=self.time[keep], W=self.W[keep], y=self.y[keep])
 
 
@@ -322,17 +364,20 @@ def observe(regressor: Any, samples: Samples) -> Observations:
         ModelError: the widths of the samples do not match the coordinates of the regressor, or more
             than half of the samples are close to singular configurations.
     """
-    keep = led_samples(regressor, samples)
+    keep = regular_samples(regressor, samples)
     full = replace(_observe(regressor, samples), dropped=int(np.sum(~keep)))
     return full if keep.all() else full.at(samples.time[keep])
 
 
 def _observe(regressor: Any, samples: Samples) -> Observations:
-    """Return the equations of every instant, interpolated close to singular configurations."""
+    """Return the equations of every sample, interpolated close to singular configurations.
+
+    `regressor` is a model of `regressors.py`, evaluated at every sample.
+    """
     return Observations(
         samples.time,
         evaluated(regressor, samples)[0],
-        samples.tau - known_of(regressor, samples),
+        samples.tau - known_efforts_at(regressor, samples),
         tuple(regressor.columns),
         samples.efforts,
         samples.effort_units,
@@ -387,17 +432,17 @@ def observe_filtered(
 def clear_of_singular(
     found: Observations, model: Any, samples: Samples, before: float, after: float | None = None
 ) -> Observations:
-    """Drop the equations whose filter or interval window contains near-singular samples.
+    """Return the equations whose time window contains no sample close to a singular configuration.
 
     Args:
         found: equations of the samples.
         model: model with which the singular configurations are found.
         samples: the complete samples.
-        before: length of the time window after the instant of an equation [s].
-        after: length of the time window before it [s]. The default is the same length.
+        before: length of the window after the instant of an equation [s].
+        after: length of the window before that instant [s]. The default is the same length.
     """
-    bad = samples.time[~led_samples(model, samples)]
-    keep = without(found.time, bad, before, before if after is None else after)
+    bad = samples.time[~regular_samples(model, samples)]
+    keep = outside_windows(found.time, bad, before, before if after is None else after)
     return replace(found.at(found.time[keep]), dropped=int(np.sum(~keep)))
 
 
@@ -463,7 +508,9 @@ def observe_energy(energy: Any, power: Any, samples: Samples, interval: float) -
         )
     (h,), (P,) = evaluated(energy, samples), evaluated(power, samples)
     v = motion_of(energy, samples)[1]
-    work = _integral(np.sum(v * (samples.tau - known_of(energy, samples)), axis=1), samples.rate)
+    work = _integral(
+        np.sum(v * (samples.tau - known_efforts_at(energy, samples)), axis=1), samples.rate
+    )
     taken = h[:, 0] + _integral(P[:, 0], samples.rate)
     ends = np.arange(0, len(samples.time), step)
     found = Observations(
@@ -478,7 +525,10 @@ def observe_energy(energy: Any, power: Any, samples: Samples, interval: float) -
 
 
 def _integral(values: Array, rate: float) -> Array:
-    """Return the cumulative integral from the first sample, by the trapezoidal rule."""
+    """Return the cumulative integral of values (n, ...) over time by the trapezoidal rule.
+
+    `rate` is the sampling rate [Hz]; the integral is zero at the first sample.
+    """
     parts = (values[1:] + values[:-1]) / (2 * rate)
     return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(parts, axis=0)])
 
@@ -520,7 +570,7 @@ def observe_momentum(filtered: Any, samples: Samples, corner: float) -> Observat
             f" {len(samples.time) / rate:.3g} s; give less than {rate:g} and a longer record"
         )
     D1, D2 = evaluated(filtered, samples)
-    tau = samples.tau - known_of(filtered, samples)
+    tau = samples.tau - known_efforts_at(filtered, samples)
     plain, slope = ([0.0, 0.0, corner**2], [0.0, corner**2, 0.0])
     keep = slice(settled, None, max(round(_ROWS * rate / corner), 1))
     W = (
@@ -559,24 +609,39 @@ INTERVALS = 1.0
 """Number of intervals of the energy model per period of the bandwidth."""
 
 
-def _dynamic(system: System, samples: Samples, bandwidth: float, options: Any) -> Observations:
-    """Return the equations of the dynamic model, with the same filter on both sides."""
+def _dynamic_equations(
+    system: System, samples: Samples, bandwidth: float, options: Any
+) -> Observations:
+    """Return the equations of the dynamic model, with the same filter on both sides.
+
+    `bandwidth` is unused, because the samples contain it; `options` are those of `columns_of`.
+    """
     return observe_filtered(regressor(system, **options), samples)
 
 
-def _filter(system: System, samples: Samples, bandwidth: float, options: Any) -> Observations:
-    """Return the equations of the filtered model with the bandwidth as corner frequency."""
+def _filtered_equations(
+    system: System, samples: Samples, bandwidth: float, options: Any
+) -> Observations:
+    """Return the equations of the filtered model with the bandwidth [Hz] as corner frequency.
+
+    `options` are those of `columns_of`.
+    """
     return observe_momentum(filtered_regressor(system, **options), samples, 2 * np.pi * bandwidth)
 
 
-def _energy(system: System, samples: Samples, bandwidth: float, options: Any) -> Observations:
-    """Return the equations of the energy model, with intervals of one period of the bandwidth."""
+def _energy_equations(
+    system: System, samples: Samples, bandwidth: float, options: Any
+) -> Observations:
+    """Return the equations of the energy model, with intervals of one period of the bandwidth [Hz].
+
+    `options` are those of `columns_of`.
+    """
     models = energy_regressor(system, **options), power_regressor(system, **options)
     return observe_energy(*models, samples, 1 / (INTERVALS * bandwidth))
 
 
 EQUATIONS: Mapping[str, Callable[[System, Samples, float, Any], Observations]] = MappingProxyType(
-    {"dynamic": _dynamic, "filtered": _filter, "energy": _energy}
+    {"dynamic": _dynamic_equations, "filtered": _filtered_equations, "energy": _energy_equations}
 )
 """Functions of the identification models: (system, samples, bandwidth, column options) ->
 equations."""
@@ -619,12 +684,12 @@ class ExcitationQuality:
 
     @property
     def sentence(self) -> str:
-        """Description of the unidentifiable parameters, or an empty text."""
+        """Names of the parameters that are not identifiable, as text; empty if there are none."""
         parts = []
         if self.unseen:
-            parts.append(f"{_list(self.unseen)} cannot be seen at all")
+            parts.append(f"{_name_list(self.unseen)} cannot be seen at all")
         if self.inseparable:
-            parts.append(f"{_list(self.inseparable)} cannot be told apart")
+            parts.append(f"{_name_list(self.inseparable)} cannot be told apart")
         return " and ".join(parts)
 
 
@@ -632,9 +697,13 @@ def excitation_quality(observations: Observations) -> ExcitationQuality:
     """Return the condition number of the observations and the parameters they do not determine.
 
     Zero columns are removed first. The other columns are scaled to unit length, since otherwise
-    rounding errors would count as independent columns.
+    rounding errors would count as independent columns. Condition numbers are infinite if a
+    parameter is not identifiable.
 
     Source: Gautier 1991 (numerical rank); Presse & Gautier 1993 (condition number).
+
+    Args:
+        observations: equations y = W K.
     """
     R = triangle(observations.rows[0])
     names = np.array(observations.names)
@@ -657,7 +726,10 @@ def excitation_quality(observations: Observations) -> ExcitationQuality:
 
 
 def require_visible(observations: Observations) -> ExcitationQuality:
-    """Return the excitation quality of observations that determine every parameter.
+    """Return the excitation quality of observations; raise if a parameter is not identifiable.
+
+    Args:
+        observations: equations y = W K.
 
     Raises:
         ModelError: there are fewer equations than parameters, or some parameters are not
@@ -680,7 +752,7 @@ def require_visible(observations: Observations) -> ExcitationQuality:
     return quality
 
 
-def _list(names: tuple[str, ...]) -> str:
-    """Return a list of names as text; long lists are shortened."""
+def _name_list(names: tuple[str, ...]) -> str:
+    """Return names as text, separated by commas; names after the eighth are only counted."""
     more = len(names) - _LISTED
     return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")

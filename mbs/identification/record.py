@@ -53,8 +53,13 @@ _STILL = 1e-9
 def check_record(record: Record) -> None:
     """Raise if the data cannot be a record of joints in SI units.
 
+    Args:
+        record: record with all its attributes set.
+
     Raises:
-        ModelError: the message names the column, the row, the value and a remedy.
+        ModelError: the shapes do not match, a value is not finite, time does not increase or has a
+            gap, positions are not in the unit or the range of their joint, or a velocity is not the
+            derivative of its position. The message names the column, the row and the value.
     """
     _check_shapes(record)
     _check_names(record)
@@ -138,9 +143,9 @@ def _check_finite(record: Record) -> None:
 
 
 def _check_time(record: Record) -> None:
-    """Raise ModelError if the times of a record do not increase, or leave a gap.
+    """Raise ModelError if the times of a record do not increase, or if a time step is too long.
 
-    The longest step is `longest_gap` of the record, or a multiple of the median step.
+    The longest accepted step is `longest_gap` of the record, by default 20 times the median step.
     """
     steps = np.diff(record.time)
     if (steps <= 0).any():
@@ -188,7 +193,10 @@ def _check_position(record: Record, k: int) -> None:
 
 
 def _check_rate(record: Record, k: int) -> None:
-    """Compare a position with the integral of its velocity, both detrended."""
+    """Raise ModelError if position column k does not match the integral of its velocity.
+
+    Both are detrended; their correlation and the ratio of their norms are compared.
+    """
     assert record.v is not None
     v, steps = record.v[:, k], np.diff(record.time)
     travelled = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * steps)])
@@ -212,7 +220,7 @@ def _check_rate(record: Record, k: int) -> None:
 
 
 def _detrend(time: Array, values: Array) -> Array:
-    """Subtract the least-squares line from the values."""
+    """Return `values` (n,) minus their least-squares line over `time` (n,)."""
     basis = np.column_stack([np.ones_like(time), time - time.mean()])
     line = basis @ np.linalg.lstsq(basis, values, rcond=None)[0]
     return np.asarray(values - line, dtype=float)
@@ -222,7 +230,12 @@ def _detrend(time: Array, values: Array) -> Array:
 
 
 def column(table: Any, name: str) -> Array:
-    """Return a column (n,) of a DataFrame, a `mbs.Result` or a dict.
+    """Return a column (n,) of a table as an array of floats.
+
+    Args:
+        table: pandas DataFrame, `mbs.Result` or dict.
+        name: name of the column. The name "time" is also the index of a DataFrame that has no such
+            column.
 
     Raises:
         ModelError: the table has no column of this name, or the column contains a value that is not
@@ -261,10 +274,10 @@ def columns(table: Any, what: str, names: Sequence[str]) -> Array:
 
 
 def csv_table(path: str | os.PathLike[str]) -> dict[str, Array]:
-    """Read the columns of a CSV file into a dict, by the names in its first row.
+    """Read a CSV file into a dict from column name to array (n,).
 
     Args:
-        path: path of a file with comma-separated columns.
+        path: path of a file with comma-separated columns; its first row contains the names.
 
     Raises:
         ModelError: the file cannot be read, the number of fields of a row differs from the header,
@@ -297,7 +310,10 @@ def csv_table(path: str | os.PathLike[str]) -> dict[str, Array]:
 
 
 def _check_header(path: str | os.PathLike[str], header: Sequence[str]) -> None:
-    """Raise if the separator is not a comma, or if the header contains numbers instead of names."""
+    """Raise ModelError if the first row of the CSV file at `path` does not consist of column names.
+
+    Its separator may not be a comma, or the row may contain numbers.
+    """
     for mark in (";", "\t"):
         if len(header) == 1 and mark in header[0]:
             raise ModelError(
@@ -362,7 +378,7 @@ class Record:
     def __post_init__(self) -> None:
         for name in ("time", "q", "tau", "v"):
             if getattr(self, name) is not None or name != "v":
-                object.__setattr__(self, name, _numbers(name, getattr(self, name)))
+                object.__setattr__(self, name, _read_only(name, getattr(self, name)))
         for name in ("names", "units", "efforts", "effort_units"):
             if isinstance(getattr(self, name), str):
                 raise ModelError(
@@ -490,8 +506,13 @@ class Record:
         return cls.from_table(csv_table(path), q, tau, v, **options)
 
     def between(self, start: float, stop: float) -> Record:
-        """Return the rows between two instants [s], both included."""
-        return self._rows((self.time >= start) & (self.time <= stop))
+        """Return the part of the record between two instants.
+
+        Args:
+            start: first instant that is included [s].
+            stop: last instant that is included [s].
+        """
+        return self._selected((self.time >= start) & (self.time <= stop))
 
     def pieces(self, longest: float | None = None) -> list[Record]:
         """Split the record at its gaps, as input of `identify`.
@@ -510,7 +531,7 @@ class Record:
         at, found = np.arange(len(self.time)), []
         for first, last in pairwise(ends):
             if last - first >= SHORTEST:
-                found.append(self._rows((at >= first) & (at < last)))
+                found.append(self._selected((at >= first) & (at < last)))
         if not found:
             raise ModelError(
                 f"record: every piece between steps of more than {most:.3g} s has less than"
@@ -518,8 +539,8 @@ class Record:
             )
         return found
 
-    def _rows(self, keep: npt.NDArray[np.bool_]) -> Record:
-        """Return the record with the rows of a mask (n,) only."""
+    def _selected(self, keep: npt.NDArray[np.bool_]) -> Record:
+        """Return the record with the rows at which the mask `keep` (n,) is True."""
         v = None if self.v is None else self.v[keep]
         return replace(self, time=self.time[keep], q=self.q[keep], tau=self.tau[keep], v=v)
 
@@ -540,9 +561,9 @@ def motor_to_joint(N: Any, q_motor: Any, tau_motor: Any) -> tuple[Array, Array]:
     Raises:
         ModelError: the shape of N does not match the data, or N is singular.
     """
-    ratios = _numbers("N", N)
+    ratios = _read_only("N", N)
     matrix = np.diag(ratios) if ratios.ndim == 1 else ratios
-    q, tau = _numbers("q_motor", q_motor), _numbers("tau_motor", tau_motor)
+    q, tau = _read_only("q_motor", q_motor), _read_only("tau_motor", tau_motor)
     width = q.shape[1] if q.ndim == 2 else 0
     if matrix.shape != (width, width) or tau.shape != q.shape:
         raise ModelError(
@@ -575,7 +596,7 @@ def _check_joints(system: System, joints: Sequence[Coordinate], width: int) -> N
 
 
 def _check_motors(system: System) -> None:
-    """Raise ModelError unless the motors of a system are its independent joints."""
+    """Raise ModelError unless the motors of a system are at its independent joints."""
     if system.motors != system.active:
         motors = ", ".join(system.speeds[k].name for k in system.motors)
         raise ModelError(
@@ -585,7 +606,10 @@ def _check_motors(system: System) -> None:
 
 
 def _check_efforts(system: System, names: Sequence[str], tau: Any) -> None:
-    """Raise if the number of efforts differs from the number of independent joints."""
+    """Raise ModelError if the array `tau` does not have one column for each independent joint.
+
+    `names` are the names of the independent joints.
+    """
     if np.ndim(tau) == 2 and np.shape(tau)[1] != len(names):
         raise ModelError(
             f"{system.name}: tau has {np.shape(tau)[1]} columns, the system has {len(names)}"
@@ -594,7 +618,11 @@ def _check_efforts(system: System, names: Sequence[str], tau: Any) -> None:
 
 
 def _check_order(what: str, given: Sequence[str], joints: Sequence[str]) -> None:
-    """Raise if a column such as "q2.tau" is assigned to another joint than q2."""
+    """Raise ModelError if a column that is named after a joint is used for another joint.
+
+    `given` are column names such as "q2.tau" and `joints` the joints they are used for; `what` is
+    q, v or tau.
+    """
     for name, joint in zip(given, joints, strict=False):
         stem = name if name in joints else name.rpartition(".")[0]
         if stem in joints and stem != joint:
@@ -604,8 +632,11 @@ def _check_order(what: str, given: Sequence[str], joints: Sequence[str]) -> None
             )
 
 
-def _numbers(name: str, values: Any) -> Array:
-    """Return values as a read-only array of floats. Raise ModelError for other types."""
+def _read_only(name: str, values: Any) -> Array:
+    """Return `values` as a read-only array of floats.
+
+    Raises ModelError for other types; `name` is the argument name in its message.
+    """
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError):
@@ -669,7 +700,7 @@ class Samples:
     @property
     def rate(self) -> float:
         """Sampling rate [Hz]."""
-        return (len(self.time) - 1) / float(self.time[-1] - self.time[0])
+        return _rate(self.time)
 
 
 def resampled(record: Record, rate: float | None = None) -> Record:
@@ -680,6 +711,9 @@ def resampled(record: Record, rate: float | None = None) -> Record:
     Args:
         record: record with any time steps.
         rate: sampling rate [Hz]; by default the inverse of the median time step of the record.
+
+    Raises:
+        ModelError: the rate is not positive.
     """
     usual = 1.0 / float(np.median(np.diff(record.time)))
     wanted = usual if rate is None else rate
@@ -767,7 +801,7 @@ def smoothed(record: Record, bandwidth: float, order: int = ORDER) -> Samples:
         ModelError: the bandwidth does not match the sampling rate, or the record is too short.
     """
     even = _without_gaps(record, bandwidth)
-    rate = _rate(even)
+    rate = _rate(even.time)
     q = zero_phase(even.q, rate, bandwidth, order)
     return _trim(even, q, central_difference(q, rate), bandwidth, order)
 
@@ -787,15 +821,16 @@ def smoothed_with_velocity(record: Record, bandwidth: float, order: int = ORDER)
         raise ModelError("record: no velocities were measured; use smoothed(), or give v")
     even = _without_gaps(record, bandwidth)
     assert even.v is not None
-    rate = _rate(even)
+    rate = _rate(even.time)
     q, v = (zero_phase(x, rate, bandwidth, order) for x in (even.q, even.v))
     return _trim(even, q, v, bandwidth, order)
 
 
 def _without_gaps(record: Record, bandwidth: float) -> Record:
-    """Resample the record at equal time steps.
+    """Return the record resampled at equal time steps.
 
-    Raise if it has a gap in which linear interpolation would change the motion.
+    Raises ModelError if a time step exceeds half a period of the bandwidth [Hz], so that linear
+    interpolation would change the motion.
     """
     steps = np.diff(record.time)
     longest = float(steps.max())
@@ -810,14 +845,20 @@ def _without_gaps(record: Record, bandwidth: float) -> Record:
     return resampled(record)
 
 
-def _rate(record: Record) -> float:
-    """Return the mean sampling rate [Hz]."""
-    return (len(record.time) - 1) / float(record.time[-1] - record.time[0])
+def _rate(time: Array) -> float:
+    """Return the mean sampling rate [Hz] of instants `time` (n,) [s]."""
+    return (len(time) - 1) / float(time[-1] - time[0])
 
 
 def _trim(even: Record, q: Array, v: Array, bandwidth: float, order: int) -> Samples:
-    """Compute accelerations, filter the efforts, drop the ends and decimate the rows."""
-    rate = _rate(even)
+    """Return the samples of a resampled record `even` and its filtered positions and velocities.
+
+    Accelerations are differences of v, efforts pass the same filter, the ends with filter
+    transients are dropped and the rows are decimated. Raises ModelError if too few rows remain.
+
+    `bandwidth` [Hz] and `order` are those of the filter.
+    """
+    rate = _rate(even.time)
     a = central_difference(v, rate)
     tau = zero_phase(even.tau, rate, bandwidth, order)
     ends = int(np.ceil(DROPPED * rate / bandwidth))

@@ -62,12 +62,12 @@ COUPLED = ("Iam", "Fvm", "Fsm")
 Coulomb friction."""
 
 _INERTIAL_UNITS = ("kg.m2",) * 6 + ("kg.m",) * 3 + ("kg",)
-_TURNING = {
+_REVOLUTE_UNITS = {
     **{kind: "kg.m2" for kind in ("Ia", "Iam", "Jm")},
     **{kind: "N.m.s/rad" for kind in ("Fv", "Fvm")},
     **{kind: "N.m" for kind in ("Fs", "Fsm", "offset")},
 }
-_SLIDING = {
+_PRISMATIC_UNITS = {
     **{kind: "kg" for kind in ("Ia", "Iam")},
     **{kind: "N.s/m" for kind in ("Fv", "Fvm")},
     **{kind: "N" for kind in ("Fs", "Fsm", "offset")},
@@ -161,16 +161,18 @@ def columns_of(
             *(_friction_kinds(link) if friction else ()),
             *(("offset",) if offsets and link.motion.nv == 1 else ()),
         ]
-        columns += _inertial(number)
+        columns += _inertial_columns(number)
         columns += [Column(f"{kind}{number}", kind, number, _unit(link, kind)) for kind in kinds]
     for pair in couplings:
-        columns += _couple(system, pair)
+        columns += _coupled_motor_columns(system, pair)
     columns += [_law_column(system, name, laws) for name in laws]
     return tuple(columns)
 
 
 def _law_column(system: System, name: str, laws: Sequence[str]) -> Column:
-    """Return the column of the component symbol `name`, if all of `laws` are columns.
+    """Return the regressor column of the component symbol `name`.
+
+    `laws` are all symbols that have columns.
 
     Raises:
         ModelError: there is no such symbol, it also appears outside the component laws, or the
@@ -219,12 +221,16 @@ class LawColumns:
     s: ModelSymbols
 
     def effort(self, column: Column) -> SX:
-        """Return the tree efforts (nv, 1) per unit of the symbol."""
+        """Return the tree efforts (nv, 1) per unit of the component symbol of the column."""
         acting = element_efforts(PartsAt(self.system, self.s.q, self.s.v_tree), self.s.poses)
         return casadi.densify(casadi.jacobian(acting, self.system.symbol_table[column.symbol]))
 
     def energy(self, column: Column) -> SX:
-        """Return the energy that the components store per unit of the symbol."""
+        """Return the energy that the components store per unit of the symbol of the column.
+
+        Raises:
+            ModelError: the stored energy is not linear in the symbol.
+        """
         stored, symbol = PartsAt(self.system, self.s.q).energy(), column.symbol
         slope = casadi.jacobian(stored, self.system.symbol_table[symbol])
         if casadi.depends_on(slope, self.system.symbol_table[symbol]):
@@ -235,7 +241,10 @@ class LawColumns:
         return SX(slope)
 
     def power(self, column: Column) -> SX:
-        """Return the power that the components absorb and do not store, per unit of the symbol."""
+        """Return the power that the components dissipate per unit of the symbol of the column.
+
+        It is the power absorbed minus the rate of the stored energy.
+        """
         rate = position_rate(self.system.tree, self.s.q, self.s.v_tree)
         stored = casadi.jtimes(self.energy(column), self.s.q, rate)
         return SX(casadi.dot(self.s.v_tree, self.effort(column)) - stored)
@@ -264,7 +273,7 @@ def chosen_columns(
             " columns alone"
         )
     require_columns(system, columns)
-    numbers_among(system, every_column(system, columns), columns)
+    column_indices(system, every_column(system, columns), columns)
     if len({column.key for column in columns}) < len(columns):
         twice = next(c for k, c in enumerate(columns) if c.key in {b.key for b in columns[:k]})
         raise ModelError(f"{system.name}: {quoted(twice.name)} is given twice; give it once")
@@ -272,7 +281,11 @@ def chosen_columns(
 
 
 def require_columns(system: System, columns: Sequence[Column]) -> None:
-    """Raise if `columns` contains anything other than Column objects.
+    """Raise unless all elements are Column objects.
+
+    Args:
+        system: system that is named in the message.
+        columns: elements to check.
 
     Raises:
         ModelError: an element is not a Column; the message quotes it.
@@ -287,7 +300,13 @@ def require_columns(system: System, columns: Sequence[Column]) -> None:
 
 
 def every_column(system: System, columns: Sequence[Column]) -> tuple[Column, ...]:
-    """Return all system parameters of the kinds in `columns`, in the order of `columns_of`."""
+    """Return all system parameters of the kinds in `columns`, in the order of `columns_of`.
+
+    Args:
+        system: open or closed.
+        columns: parameters that select whether offsets, coupled motors and component symbols are
+            included.
+    """
     return columns_of(
         system,
         offsets=any(column.kind == "offset" for column in columns),
@@ -296,8 +315,13 @@ def every_column(system: System, columns: Sequence[Column]) -> tuple[Column, ...
     )
 
 
-def numbers_among(system: System, every: Sequence[Column], columns: Sequence[Column]) -> list[int]:
-    """Return the indices of `columns` in `every`.
+def column_indices(system: System, every: Sequence[Column], columns: Sequence[Column]) -> list[int]:
+    """Return the indices in `every` of the parameters `columns`, which may have other names.
+
+    Args:
+        system: system that is named in the message.
+        every: all parameters.
+        columns: parameters to find.
 
     Raises:
         ModelError: a column is not in `every`.
@@ -313,9 +337,13 @@ def numbers_among(system: System, every: Sequence[Column], columns: Sequence[Col
 
 
 def symbolic_parameters(system: System, columns: Iterable[Column]) -> SX:
-    """Return the parameter values (n, 1): numbers, or expressions of the symbols of the system.
+    """Return the values (n, 1) of the dynamic parameters of a system: numbers or expressions.
 
     Offsets and the parameters of coupled motors are zero, since a system does not contain them.
+
+    Args:
+        system: open or closed; expressions contain its symbols.
+        columns: the n parameters.
     """
     links = system.tree.links
     ten = [link.inertia.parameters for link in links]
@@ -335,11 +363,11 @@ def symbolic_parameters(system: System, columns: Iterable[Column]) -> SX:
 def numeric_parameters(
     system: System, columns: Iterable[Column], values: Mapping[str, float] | None = None
 ) -> NDArray[np.float64]:
-    """Return the parameter values (n,) as numbers.
+    """Return the values (n,) of the dynamic parameters of a system as numbers.
 
     Args:
         system: open or closed.
-        columns: the parameters.
+        columns: the n parameters.
         values: values of symbols by name. Other symbols have their default values.
 
     Raises:
@@ -350,48 +378,54 @@ def numeric_parameters(
 
 
 def _joint_value(link: Link, kind: str) -> SX:
-    """Return the value of a joint parameter of a link: "Ia", "Jm", "Fv" or "Fs"; 0 without it."""
+    """Return value of the joint parameter `kind` of a link: "Ia", "Jm", "Fv" or "Fs"; else 0."""
     if kind == "Jm":
         return link.rotor.inertia if link.rotor is not None else SX(0)
     known = {"Ia": link.Ia, "Fv": link.Fv, "Fs": link.Fs}
     return known.get(kind, SX(0))
 
 
-def _inertial(number: int) -> list[Column]:
-    """Return the columns of the ten inertial parameters of a link by its number."""
+def _inertial_columns(number: int) -> list[Column]:
+    """Return the columns of the ten inertial parameters of the link with this number (from 1)."""
     pairs = zip(INERTIAL, _INERTIAL_UNITS, strict=True)
     return [Column(f"{kind}{number}", kind, number, unit) for kind, unit in pairs]
 
 
 def _rotor_kinds(system: System, link: Link) -> list[str]:
-    """Return the rotor parameters of a joint that are identified: "Ia" and "Jm", if it has them."""
+    """Return the kinds of rotor inertia of a joint that have columns: "Ia", "Jm", both or none.
+
+    "Ia" is included if it is nonzero or the joint is actuated without an own rotor.
+    """
     driven = system.speeds[link.v.start].actuated and link.rotor is None
     kinds = ["Ia"] if driven or not link.Ia.is_zero() else []
     return [*kinds, "Jm"] if link.rotor is not None else kinds
 
 
 def _friction_kinds(link: Link) -> list[str]:
-    """Return the friction parameters of a joint, "Fv" and "Fs".
+    """Return the kinds of friction of a joint that have columns: "Fv" and "Fs".
 
-    A free joint has only the parameters that are nonzero.
+    A free joint has only those that are nonzero.
     """
     given = {"Fv": link.Fv, "Fs": link.Fs}
     return [k for k, x in given.items() if link.motion is not Motion.FREE or not x.is_zero()]
 
 
 def _unit(link: Link, kind: str) -> str:
-    """Return the unit of a joint parameter, which differs for prismatic joints."""
-    return (_SLIDING if link.motion is Motion.PRISMATIC else _TURNING)[kind]
+    """Return the unit of a joint parameter of this kind, which depends on the type of the joint."""
+    return (_PRISMATIC_UNITS if link.motion is Motion.PRISMATIC else _REVOLUTE_UNITS)[kind]
 
 
-def _couple(system: System, pair: Joints) -> list[Column]:
-    """Return the three columns of a motor that is coupled to two joints."""
+def _coupled_motor_columns(system: System, pair: Joints) -> list[Column]:
+    """Return the columns Iam, Fvm, Fsm of a motor that is coupled to the two joints of `pair`.
+
+    Raises ModelError unless they are two joints of the same type.
+    """
     if not isinstance(pair, (tuple, list)) or len(pair) != 2:
         raise ModelError(
             f"{system.name}: the coupling {quoted(pair)} does not name two joints; give a pair such"
             " as ('j6', 'j5')"
         )
-    number, other = (_joint(system, name) for name in pair)
+    number, other = (_joint_number(system, name) for name in pair)
     link, second = (system.tree.links[k - 1] for k in (number, other))
     if number == other or link.motion is not second.motion:
         raise ModelError(
@@ -402,8 +436,11 @@ def _couple(system: System, pair: Joints) -> list[Column]:
     return [Column(f"{k}{number}", k, number, _unit(link, k), other) for k in COUPLED]
 
 
-def _joint(system: System, name: str | int) -> int:
-    """Return the link number of a joint of one degree of freedom."""
+def _joint_number(system: System, name: str | int) -> int:
+    """Return the link number (from 1) of a joint of one degree of freedom, by name or number.
+
+    Raises ModelError if there is no such joint.
+    """
     links = system.tree.links
     names = {link.name: k for k, link in enumerate(links, start=1) if link.motion.nv == 1}
     if isinstance(name, str) and name in names:
@@ -442,7 +479,14 @@ class JointColumns:
 
     @staticmethod
     def of(tree: Tree, poses: list[LinkPose], v: SX, base: Velocity | None = None) -> JointColumns:
-        """Return the columns, with the link velocities computed from v."""
+        """Return the columns at joint velocities v, from which the link velocities are computed.
+
+        Args:
+            tree: the links.
+            poses: pose of each link relative to its antecedent.
+            v: (nv, 1) joint velocities [rad/s or m/s].
+            base: velocity of the base; None if the base is at rest.
+        """
         return JointColumns(tree, poses, v, link_velocities(tree, poses, v, base), base)
 
     def effort(self, column: Column, a: SX, motions: list[Acceleration], base: Acceleration) -> SX:
@@ -455,51 +499,74 @@ class JointColumns:
             base: acceleration of the base.
         """
         if column.kind != "Jm":
-            return self._own(column, self.v, a)
+            return self._own_effort(column, self.v, a)
         alone = self._with_one_rotor(column)
         total = rotor_efforts(alone, a, motions, base)
         for c, moment in rotor_moments(alone, self.v, a, motions).items():
-            total += self._along(self._twists(c), moment)
+            total += self._moment_efforts(self._twists(c), moment)
         return total
 
     def momentum(self, column: Column) -> SX:
-        """Return the derivative (nv, 1) of the kinetic energy in v per unit of a parameter."""
+        """Return the generalised momentum (nv, 1) per unit of a parameter.
+
+        It is the derivative of the kinetic energy in the joint velocities.
+
+        Args:
+            column: parameter.
+        """
         if column.kind not in _INERTIAS:
             return zeros(self.tree.nv)
         if column.kind != "Jm":
-            return self._own(column, zeros(self.tree.nv), self.v)
+            return self._own_effort(column, zeros(self.tree.nv), self.v)
         link, rotor = self._rotor(column)
         total = zeros(self.tree.nv)
-        total[link.v] = rotor.seen_at_joint * self.v[link.v] + self._spin(rotor)
+        total[link.v] = rotor.seen_at_joint * self.v[link.v] + self._carrier_momentum(rotor)
         if rotor.carrier >= 0:
             spin = rotor.momentum * self.v[link.v]
-            total += self._along(self._twists(rotor.carrier), spin)
+            total += self._moment_efforts(self._twists(rotor.carrier), spin)
         return total
 
-    def rest(self, column: Column) -> SX:
-        """Return efforts (nv, 1) minus the rate of the momentum, per unit of a parameter."""
+    def remaining_effort(self, column: Column) -> SX:
+        """Return the efforts that are not the rate of `momentum` (nv, 1), per unit of a parameter.
+
+        These are the joint efforts minus the time derivative of the generalised momentum.
+
+        Args:
+            column: parameter.
+        """
         if column.kind != "Jm":
-            return self._own(column, self.v, zeros(self.tree.nv))
+            return self._own_effort(column, self.v, zeros(self.tree.nv))
         link, rotor = self._rotor(column)
         if rotor.carrier < 0:
             return zeros(self.tree.nv)
         rates = path_twist_rates(self.tree, self.poses, self.velocities)
-        return -self._along(rates[rotor.carrier], rotor.momentum * self.v[link.v])
+        return -self._moment_efforts(rates[rotor.carrier], rotor.momentum * self.v[link.v])
 
     def energy(self, column: Column) -> SX:
-        """Return the kinetic energy per unit of a parameter; zero for friction and offsets."""
+        """Return the kinetic energy per unit of a parameter; zero for friction and offsets.
+
+        Args:
+            column: parameter.
+        """
         if column.kind not in _INERTIAS:
             return SX(0)
         return SX(0.5 * casadi.dot(self.v, self.momentum(column)))
 
     def power(self, column: Column) -> SX:
-        """Return the power that friction or an offset absorbs per unit of the parameter."""
+        """Return the power that friction or an offset absorbs per unit of it; zero for inertias.
+
+        Args:
+            column: parameter.
+        """
         if column.kind in _INERTIAS:
             return SX(0)
-        return SX(casadi.dot(self.v, self.rest(column)))
+        return SX(casadi.dot(self.v, self.remaining_effort(column)))
 
-    def _own(self, column: Column, v: SX, a: SX) -> SX:
-        """Return the joint efforts (nv, 1) of the joint law with this parameter equal to one."""
+    def _own_effort(self, column: Column, v: SX, a: SX) -> SX:
+        """Return the joint efforts (nv, 1) of a unit parameter that acts on its own joint only.
+
+        v and a are (nv, 1) joint velocities and accelerations. Coupled motors act on two joints.
+        """
         link, total = self.tree.links[column.link - 1], zeros(self.tree.nv)
         if column.kind == "offset":
             total[link.v] = 1
@@ -508,14 +575,15 @@ class JointColumns:
         Ia, Fv, Fs = (one.get(kind, SX(0)) for kind in ("Ia", "Fv", "Fs"))
         unit = replace(link, Ia=Ia, Fv=Fv, Fs=Fs)
         if column.kind not in COUPLED:
-            total[link.v] = _law(unit, v[link.v], a[link.v])
+            total[link.v] = _joint_law(unit, v[link.v], a[link.v])
             return total
         second = self.tree.links[column.other - 1]
-        effort = _law(unit, v[link.v] + v[second.v], a[link.v] + a[second.v])
+        effort = _joint_law(unit, v[link.v] + v[second.v], a[link.v] + a[second.v])
         total[link.v] = total[second.v] = effort
         return total
 
     def _with_one_rotor(self, column: Column) -> Tree:
+        """Return the tree with only the rotor of the column, of unit inertia."""
         links = [
             replace(link, rotor=self._rotor(column)[1] if number == column.link else None)
             for number, link in enumerate(self.tree.links, start=1)
@@ -523,29 +591,36 @@ class JointColumns:
         return Tree(tuple(links), self.tree.gravity)
 
     def _rotor(self, column: Column) -> tuple[Link, CarriedRotor]:
-        """Return the link of the joint and its rotor with unit inertia."""
+        """Return the link of the column and its rotor with unit inertia."""
         link = self.tree.links[column.link - 1]
         assert link.rotor is not None
         return link, replace(link.rotor, inertia=SX(1))
 
-    def _spin(self, rotor: CarriedRotor) -> SX:
-        """Return the generalised momentum at the joint of a rotor due to the carrier's rotation."""
+    def _carrier_momentum(self, rotor: CarriedRotor) -> SX:
+        """Return the momentum of a rotor at its joint that is due to the rotation of its carrier.
+
+        The carrier is the link that supports the rotor, or the base.
+        """
         carrier = self.velocities[rotor.carrier] if rotor.carrier >= 0 else self.base
         return SX(0) if carrier is None else SX(casadi.dot(rotor.momentum, carrier.w))
 
     def _twists(self, carrier: int) -> list[PathTwist]:
+        """Return the twists of the joints on the path from the base to link `carrier` (index)."""
         return path_twists(self.tree, self.poses)[carrier]
 
-    def _along(self, twists: list[PathTwist], moment: SX) -> SX:
-        """Return the work (nv, 1) of a moment on each of the path twists."""
+    def _moment_efforts(self, twists: list[PathTwist], moment: SX) -> SX:
+        """Return the generalised forces (nv, 1) of a moment (3, 1) along the path twists."""
         total = zeros(self.tree.nv)
         for twist in twists:
             total[twist.row] = work(twist, (None, moment))
         return total
 
 
-def _law(link: Link, v: SX, a: SX) -> SX:
-    """Return the efforts of rotor inertia and friction of the joint of a link."""
+def _joint_law(link: Link, v: SX, a: SX) -> SX:
+    """Return the efforts (nv, 1) of rotor inertia and friction of the joint of a link.
+
+    `v` and `a` are the velocities and accelerations of this joint.
+    """
     alone = replace(link, v=slice(0, link.motion.nv))
     return rotor_and_friction(Tree((alone,), zeros()), v, a)
 
@@ -590,12 +665,16 @@ class Regressor(ModelFunction):
         """Return another Function as a model with the same inputs.
 
         It is a Regressor with the same columns if its first output has the same size.
+
+        Args:
+            function: Function of the same inputs, such as a derivative or compiled code.
         """
         same = function.size_out(0) == self.size_out(0)
         plain = ModelFunction(function, self.system, None, self._check_configuration)
         return Regressor(plain, self.columns) if same else ModelFunction.like(self, function)
 
     def _outputs(self) -> list[SX]:
+        """Return the outputs as SX expressions of new symbols."""
         inputs = [SX.sym(name, self.sparsity_in(name)) for name in self.name_in()]
         return list(Function.call(self, inputs, True, False))
 
@@ -638,7 +717,7 @@ def regressor(
         around = surroundings(system, moves=moving_base)
         motions = link_accelerations(tree, s.poses, s.v_tree, a_tree, around.base)
         joints, laws = JointColumns.of(tree, s.poses, s.v_tree), LawColumns(system, s)
-        D = side_by_side(
+        D = matrix_of_columns(
             taken,
             inertial_regressor(tree, s.poses, motions),
             lambda column: (
@@ -667,6 +746,9 @@ def known_efforts(
 
     Returns:
         Function of q (nq, 1) and v (m, 1); tau (m, 1) [N m or N].
+
+    Raises:
+        ModelError: an element of `laws` is not such a symbol.
     """
 
     def build() -> tuple[Named, Named]:
@@ -692,14 +774,18 @@ def regressor_function(
     columns: tuple[Column, ...],
     build: Callable[[ModelSymbols], tuple[Named, Named]],
 ) -> Regressor:
-    """Return the model with these columns. It is built at the first call and cached.
+    """Return the cached Regressor of a system; it is built at the first call.
 
     Args:
         system: system of the model.
         key: name of the Function, whether the base moves, and the coordinates ("independent" or
             "tree") of a closed system.
-        columns: columns of the outputs.
-        build: callable that returns the inputs after q and v, and the outputs.
+        columns: parameters, one for each column of the outputs.
+        build: callable of the model symbols. It returns two lists of (name, expression): the inputs
+            after q and v, and the outputs.
+
+    Raises:
+        ModelError: the coordinates are not "independent" or "tree".
     """
     coordinates = key[-1]
     check_coordinates(system, coordinates)
@@ -718,12 +804,15 @@ def regressor_function(
     return made
 
 
-def side_by_side(
+def matrix_of_columns(
     columns: tuple[Column, ...], blocks: list[SX], other: Callable[[Column], SX]
 ) -> SX:
-    """Assemble the columns of a matrix from the blocks of the links and from `other`.
+    """Return the matrix (rows, n) with one column for each parameter.
 
-    The columns of inertial parameters come from the blocks, the other columns from `other`.
+    Args:
+        columns: the n parameters.
+        blocks: (rows, 10) matrix of each link: columns of its inertial parameters.
+        other: callable that returns the column (rows, 1) of any other parameter.
     """
     picked = (
         blocks[column.link - 1][:, INERTIAL.index(column.kind)]
@@ -769,7 +858,9 @@ def energy_regressor(
         joints = JointColumns.of(system.tree, s.poses, s.v_tree)
         blocks = inertial_energy(system.tree, s.poses, joints.velocities)
         laws = LawColumns(system, s)
-        h = side_by_side(taken, blocks, lambda c: laws.energy(c) if c.symbol else joints.energy(c))
+        h = matrix_of_columns(
+            taken, blocks, lambda c: laws.energy(c) if c.symbol else joints.energy(c)
+        )
         return [], [("h", h)]
 
     return regressor_function(system, ("energy_regressor", False, coordinates), taken, build)
@@ -805,7 +896,7 @@ def power_regressor(
         joints = JointColumns.of(system.tree, s.poses, s.v_tree)
         blocks = [zeros(1, 10) for _ in system.tree.links]
         laws = LawColumns(system, s)
-        power = side_by_side(
+        power = matrix_of_columns(
             taken, blocks, lambda c: laws.power(c) if c.symbol else joints.power(c)
         )
         return [], [("P", power)]
@@ -849,27 +940,34 @@ def filtered_regressor(
     taken = chosen_columns(system, columns, choice)
 
     def build(s: ModelSymbols) -> tuple[Named, Named]:
-        tree, base, inputs = _surroundings(system, moving_base)
+        tree, base, inputs = _base_motion(system, moving_base)
         joints = JointColumns.of(tree, s.poses, s.v_tree, base)
         momenta = momentum_regressor(tree, s.poses, joints.velocities)
         rests = position_regressor(tree, s.poses, joints.velocities)
         laws = LawColumns(system, s)
-        D1 = side_by_side(
+        D1 = matrix_of_columns(
             taken, momenta, lambda c: zeros(system.nv) if c.symbol else joints.momentum(c)
         )
         D2 = s.reduced_effort(
-            side_by_side(taken, rests, lambda c: laws.effort(c) if c.symbol else joints.rest(c))
+            matrix_of_columns(
+                taken, rests, lambda c: laws.effort(c) if c.symbol else joints.remaining_effort(c)
+            )
         )
         if s.reduction is not None:
-            D2 = D2 - casadi.mtimes(_rate(system, s, s.reduction.G).T, D1)
+            D2 = D2 - casadi.mtimes(_matrix_rate(system, s, s.reduction.G).T, D1)
         return inputs, [("D1", s.reduced_effort(D1)), ("D2", D2)]
 
     key = ("filtered_regressor", moving_base, coordinates)
     return regressor_function(system, key, taken, build)
 
 
-def _surroundings(system: System, moves: bool) -> tuple[Tree, Velocity | None, Named]:
-    """Return the tree with gravity in base axes, the base velocity, and the inputs of both."""
+def _base_motion(system: System, moves: bool) -> tuple[Tree, Velocity | None, Named]:
+    """Return the tree, the base velocity and the named inputs v_0 and R_0 of a moving base.
+
+    Gravity of the tree is then in base axes. Without a moving base: None and no inputs.
+
+    `moves` is whether the base moves.
+    """
     if not moves:
         return system.tree, None, []
     v_0, R_0 = SX.sym("v_0", 6), SX.sym("R_0", 3, 3)
@@ -877,7 +975,10 @@ def _surroundings(system: System, moves: bool) -> tuple[Tree, Velocity | None, N
     return tree, Velocity(v_0[0:3], v_0[3:6]), [("v_0", v_0), ("R_0", R_0)]
 
 
-def _rate(system: System, s: ModelSymbols, G: SX) -> SX:
-    """Return the time derivative of a matrix that depends on the positions."""
+def _matrix_rate(system: System, s: ModelSymbols, G: SX) -> SX:
+    """Return the time derivative of a matrix G that depends on positions only, same shape as G.
+
+    `s` are the symbols of positions and velocities of the model.
+    """
     qdot = position_rate(system.tree, s.q, s.v_tree)
     return casadi.reshape(casadi.jtimes(casadi.vec(G), s.q, qdot), *G.shape)

@@ -20,7 +20,7 @@ from mbs.identification.leading import (
     configuration_of,
     is_explicit,
     leads_of,
-    of_motion,
+    motion_function,
     positions,
     signed_leads,
 )
@@ -65,19 +65,36 @@ class FourierSeries:
         return int(self.sine.shape[1])
 
     def q(self, t: npt.ArrayLike) -> Array:
-        """Return positions (n, m) [rad or m] at the instants t (n,) [s], or (m,) for a scalar t."""
+        """Return the positions (n, m) of the joints [rad or m], or (m,) for a scalar t.
+
+        Args:
+            t: (n,) instants [s], or one instant.
+
+        Raises:
+            ModelError: t is a symbol; use `law`.
+        """
         return self.middle + self._sum(t, 0)
 
     def v(self, t: npt.ArrayLike) -> Array:
-        """Return the velocities (n, m) or (m,) [rad/s or m/s]; see `q`."""
+        """Return the velocities (n, m) of the joints [rad/s or m/s], or (m,) for a scalar t.
+
+        Args:
+            t: (n,) instants [s], or one instant.
+        """
         return self._sum(t, 1)
 
     def a(self, t: npt.ArrayLike) -> Array:
-        """Return the accelerations (n, m) or (m,) [rad/s2 or m/s2]; see `q`."""
+        """Return the accelerations (n, m) of the joints [rad/s2 or m/s2], or (m,) for a scalar t.
+
+        Args:
+            t: (n,) instants [s], or one instant.
+        """
         return self._sum(t, 2)
 
     def law(self, t: SX | MX, order: int = 0) -> SX | MX:
-        """Return the positions (m, 1) as an expression, for controllers and prescribed motions.
+        """Return the positions (m, 1) or a time derivative as an expression of the time.
+
+        Use it in controllers and prescribed motions.
 
         Args:
             t: symbol of the time [s].
@@ -92,7 +109,7 @@ class FourierSeries:
         return moved + DM(self.middle) if order == 0 else moved
 
     def _sum(self, t: npt.ArrayLike, order: int) -> Array:
-        """Return a derivative of the Fourier series at times t; order 0 is its value."""
+        """Return the derivative of this order (n, m) at times t (n,); order 0 is q without q0."""
         if isinstance(t, SX | MX):
             raise ModelError("excitation: the time is a symbol; use law(t), which takes symbols")
         instants = np.asarray(t, dtype=float)
@@ -102,12 +119,14 @@ class FourierSeries:
 
 
 def harmonic_terms(t: Array, period: float, harmonics: int, order: int) -> Array:
-    """Return the factors (n, 2 harmonics) of a_1 .. and b_1 .. in a derivative of the series.
+    """Return the matrix (n, 2 harmonics) from coefficients to a derivative of a Fourier series.
+
+    The coefficients are a_1 .. a_H, b_1 .. b_H of `FourierSeries`, in this order.
 
     Args:
         t: (n,) instants [s].
         period: period [s].
-        harmonics: number of harmonics.
+        harmonics: number H of harmonics.
         order: 0 for q - q0, 1 for the velocity, 2 for the acceleration.
     """
     w = 2 * np.pi / period * np.arange(1, harmonics + 1)
@@ -128,12 +147,12 @@ def resting_coefficients(period: float, harmonics: int) -> Array:
     """
     w = np.asarray(2 * np.pi / period * np.arange(1, harmonics + 1), dtype=float)
     # v(0) is the sum of a_k and a(0) the sum of w_k b_k: one condition for each half
-    halves = [_across(condition) for condition in (w**0, w)]
+    halves = [_orthogonal_complement(condition) for condition in (w**0, w)]
     none = np.zeros((harmonics, harmonics - 1))
     return np.block([[halves[0], none], [none, halves[1]]])
 
 
-def _across(direction: Array) -> Array:
+def _orthogonal_complement(direction: Array) -> Array:
     """Return an orthonormal basis (n, n - 1) of the complement of a direction (n,).
 
     A Householder reflection is used because the basis from a singular value decomposition depends
@@ -297,7 +316,7 @@ class MotionLimits:
 
     @property
     def of_models(self) -> tuple[MotionLimit, ...]:
-        """Limits of efforts, passive positions, planes and leading, in this order."""
+        """Limits of efforts, passive positions, planes and singularities, in this order."""
         planes = (
             MotionLimit("plane", str(plane.frame), "m", plane.offset, np.inf)
             for plane in self.planes
@@ -314,7 +333,16 @@ def limits_of(
     effort: Bound = None,
     planes: Sequence[Plane] = (),
 ) -> MotionLimits:
-    """Return the limits of a motion; by default the limits of the joints.
+    """Return the limits of a motion of the independent joints; by default the limits of the joints.
+
+    Args:
+        system: open or closed.
+        position: limits of positions [rad or m]: a number +- for all joints, a sequence of ranges,
+            or a dict from joint name to range, which may contain passive joints.
+        velocity: limits of velocities in the same form [rad/s or m/s].
+        acceleration: limits of accelerations in the same form [rad/s2 or m/s2].
+        effort: limits of efforts in the same form [N m or N].
+        planes: half-space constraints of points of the robot.
 
     Raises:
         ModelError: the number of limits differs from the number of independent joints, a range is
@@ -329,10 +357,10 @@ def limits_of(
     def rows(
         quantity: str, bound: Bound, units: Sequence[str], known: Mapping[str, Range] = free
     ) -> tuple[MotionLimit, ...]:
-        pairs = _pairs(system, quantity, bound, known)
+        pairs = _joint_ranges(system, quantity, bound, known)
         return tuple(MotionLimit(quantity, *row) for row in _join(list(known), units, pairs))
 
-    own, others = _positions(system, position, indices)
+    own, others = _position_limits(system, position, indices)
     positions = rows("position", own, [joint.unit for joint in joints])
     for limit in positions:
         if not (np.isfinite(limit.lower) and np.isfinite(limit.upper)):
@@ -348,27 +376,32 @@ def limits_of(
             )
     return MotionLimits(
         positions,
-        rows("velocity", velocity, rates, {name: _known(motors[name].limits) for name in free}),
+        rows(
+            "velocity",
+            velocity,
+            rates,
+            {name: _described_range(motors[name].limits) for name in free},
+        ),
         rows("acceleration", acceleration, [ACCELERATION_UNIT[unit] for unit in rates]),
         rows(
             "effort",
             effort,
             [EFFORT_UNIT[unit] for unit in rates],
-            {name: _known(motors[name].effort) for name in free},
+            {name: _described_range(motors[name].effort) for name in free},
         ),
         others,
         tuple(planes),
-        _leading(system),
+        _singularity_limit(system),
     )
 
 
-def _known(described: tuple[float, float] | None) -> Range:
-    """Return the range of a joint, or None if both ends are infinite."""
+def _described_range(described: tuple[float, float] | None) -> Range:
+    """Return the range of a joint as described, or None if both ends are infinite."""
     return None if described is None or np.isinf(described).all() else described
 
 
-def _leading(system: System) -> tuple[MotionLimit, ...]:
-    """Return the limit of the distance from singular configurations.
+def _singularity_limit(system: System) -> tuple[MotionLimit, ...]:
+    """Return the limit of the distance from singular configurations; empty for an open system.
 
     It is reduced if the assembled configuration itself is close to a singular one.
     """
@@ -378,10 +411,13 @@ def _leading(system: System) -> tuple[MotionLimit, ...]:
     return (MotionLimit("leading", system.name, "1", least, np.inf),)
 
 
-def _positions(
+def _position_limits(
     system: System, bound: Bound, indices: Sequence[int]
 ) -> tuple[Bound, tuple[tuple[int, MotionLimit], ...]]:
-    """Return the ranges of independent joints, and the limits of passive joints by index in q."""
+    """Return the position limits of independent joints, and of passive joints by index in q.
+
+    `bound` are the limits of the user and `indices` the indices in q of the independent joints.
+    """
     ranges: dict[str, Range] = {c.name: c.limits for c in system.coordinates}
     known = [c.name for c in system.coordinates if c.unit in RATE_UNITS]
     if isinstance(bound, Mapping):
@@ -390,7 +426,7 @@ def _positions(
     passive = []
     for k, c in enumerate(system.coordinates):
         if k not in indices and ranges[c.name] is not None:
-            lower, upper = _pair(system, "position", ranges[c.name], c.name)
+            lower, upper = _joint_range(system, "position", ranges[c.name], c.name)
             passive.append((k, MotionLimit("position", c.name, c.unit, lower, upper)))
     if bound is None or isinstance(bound, Mapping):
         bound = [ranges[system.coordinates[k].name] for k in indices]
@@ -398,7 +434,7 @@ def _positions(
 
 
 def _check_names(system: System, what: str, given: Mapping[str, Any], known: Sequence[str]) -> None:
-    """Raise ModelError if limits or ranges (`what`) name an unknown joint."""
+    """Raise ModelError if a key of `given` is not in `known`; `what` is the kind of limit."""
     for name in given:
         if name not in known:
             raise ModelError(
@@ -410,15 +446,18 @@ def _check_names(system: System, what: str, given: Mapping[str, Any], known: Seq
 def _join(
     names: Sequence[str], units: Sequence[str], pairs: Sequence[tuple[float, float]]
 ) -> list[tuple[str, str, float, float]]:
-    """Return (name, unit, lower, upper) of each quantity."""
+    """Return tuples (name, unit, lower, upper) of quantities, from `pairs` (lower, upper)."""
     rows = zip(names, units, pairs, strict=True)
     return [(name, unit, lower, upper) for name, unit, (lower, upper) in rows]
 
 
-def _pairs(
+def _joint_ranges(
     system: System, quantity: str, bound: Bound, described: Mapping[str, Range]
 ) -> list[tuple[float, float]]:
-    """Return (lower, upper) of each joint; `described` contains the default ranges."""
+    """Return (lower, upper) of each joint in `described`, a dict from joint name to default range.
+
+    `bound` are the limits of the user for this quantity, in any accepted form.
+    """
     names = list(described)
     if bound is None or isinstance(bound, Mapping):
         given = bound or {}
@@ -435,11 +474,14 @@ def _pairs(
             f"{system.name}: {quantity} has {len(values)} limits for {len(names)} independent"
             f" joints: {', '.join(names)}; give one for each"
         )
-    return [_pair(system, quantity, x, name) for x, name in zip(values, names, strict=True)]
+    return [_joint_range(system, quantity, x, name) for x, name in zip(values, names, strict=True)]
 
 
-def _pair(system: System, quantity: str, value: Range, name: str) -> tuple[float, float]:
-    """Return lower and upper limit of a range: a single number is symmetric, None is unlimited."""
+def _joint_range(system: System, quantity: str, value: Range, name: str) -> tuple[float, float]:
+    """Return the lower and upper limit of one quantity of the joint `name`.
+
+    A number is symmetric, None is unlimited. Raises ModelError for an empty or infinite range.
+    """
     if value is None:
         return -np.inf, np.inf
     ends = np.asarray(value, dtype=float).ravel()
@@ -491,23 +533,51 @@ class Trajectory:
         )
 
     def q(self, t: npt.ArrayLike) -> Array:
-        """Return positions (n, m) of the independent joints [rad or m] at t (n,) [s], or (m,)."""
+        """Return the positions (n, m) of the independent joints [rad or m], or (m,) for a scalar t.
+
+        Args:
+            t: (n,) instants [s], or one instant.
+        """
         return self.series.q(t)
 
     def v(self, t: npt.ArrayLike) -> Array:
-        """Return the velocities (n, m) or (m,) of the independent joints [rad/s or m/s]."""
+        """Return the velocities (n, m) of the independent joints, or (m,) for a scalar t.
+
+        They are in rad/s or m/s.
+
+        Args:
+            t: (n,) instants [s], or one instant.
+        """
         return self.series.v(t)
 
     def a(self, t: npt.ArrayLike) -> Array:
-        """Return the accelerations (n, m) or (m,) of the independent joints [rad/s2 or m/s2]."""
+        """Return the accelerations (n, m) of the independent joints, or (m,) for a scalar t.
+
+        They are in rad/s2 or m/s2.
+
+        Args:
+            t: (n,) instants [s], or one instant.
+        """
         return self.series.a(t)
 
     def law(self, t: SX | MX, order: int = 0) -> SX | MX:
-        """Return positions (m, 1) of independent joints as expression; see `FourierSeries.law`."""
+        """Return the positions (m, 1) of the independent joints as an expression of the time.
+
+        Args:
+            t: symbol of the time [s].
+            order: order of the time derivative: 0 for positions, 1 for velocities, 2 for
+                accelerations.
+        """
         return self.series.law(t, order)
 
     def configuration(self, t: npt.ArrayLike) -> Array:
-        """Return the positions (n, nq) or (nq,) of all joints of the tree, with closed loops."""
+        """Return the positions (n, nq) of all joints of the tree, or (nq,) for a scalar t.
+
+        The loops are closed; rows are NaN if they cannot close.
+
+        Args:
+            t: (n,) instants [s], or one instant.
+        """
         instants = np.asarray(t, dtype=float)
         q = positions(self.system, self.series.q(instants.ravel()))
         return np.asarray(q.reshape(*instants.shape, self.system.nq), dtype=float)
@@ -568,11 +638,11 @@ class Trajectory:
             f"Objective {self.objective}: {self.status} after {self.steps} steps",
             "quantity      name       lowest    highest      limits                margin",
         ]
-        lines += [_line(margin) for margin in self.margins if margin.limit.is_finite]
+        lines += [_margin_line(margin) for margin in self.margins if margin.limit.is_finite]
         return "\n".join(lines)
 
 
-def _line(margin: Margin) -> str:
+def _margin_line(margin: Margin) -> str:
     """Return one line of the table of margins."""
     limit = margin.limit
     ends = f"{limit.lower:9.4g} .. {limit.upper:<9.4g}"
@@ -606,10 +676,10 @@ def instant(system: System, columns: Sequence[Column], limits: MotionLimits) -> 
     m = len(system.active)
     q_a, v_a, a_a = (MX.sym(name, m) for name in ("q_a", "v_a", "a_a"))
     q = configuration_of(system, q_a)
-    D = of_motion(regressor(system, columns))(q, v_a, a_a)
+    D = motion_function(regressor(system, columns))(q, v_a, a_a)
     bounded = [*_efforts(system, limits, q, v_a, a_a), *(q[k] for k, _ in limits.passive)]
     for plane in limits.planes:
-        T = of_motion(transform(system, plane.frame))(q)
+        T = motion_function(transform(system, plane.frame))(q)
         bounded.append(casadi.dot(DM(plane.unit_normal), (T @ DM([*plane.point, 1.0]))[:3]))
     if limits.leading:
         bounded.append(signed_leads(system)(q))
@@ -620,6 +690,11 @@ def instant(system: System, columns: Sequence[Column], limits: MotionLimits) -> 
 
 
 def _efforts(system: System, limits: MotionLimits, q: MX, v_a: MX, a_a: MX) -> list[MX]:
+    """Return the effort of each independent joint at one instant; zeros if no effort is limited.
+
+    q (nq, 1) closes the loops; v_a and a_a (m, 1) are of the independent joints. Raises ModelError
+    if motors are at other joints.
+    """
     if not any(limit.is_finite for limit in limits.effort):
         return [MX(0) for _ in limits.effort]
     if system.motors != system.active:
@@ -627,5 +702,5 @@ def _efforts(system: System, limits: MotionLimits, q: MX, v_a: MX, a_a: MX) -> l
             f"{system.name}: limits of efforts are given and its motors are not its independent"
             " joints, so that they share efforts in many ways; leave the limits of efforts out"
         )
-    tau = of_motion(inverse_dynamics(system))(q, v_a, a_a)
+    tau = motion_function(inverse_dynamics(system))(q, v_a, a_a)
     return [tau[k] for k in range(len(limits.effort))]

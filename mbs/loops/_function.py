@@ -33,12 +33,21 @@ Given = Mapping[str, float] | Sequence[float] | None
 
 
 def independent_names(system: System) -> list[str]:
-    """Return the names of the independent joints, in the order of `system.free`."""
+    """Return the names of the independent joints, in the order of `system.free`.
+
+    Args:
+        system: assembled mechanism.
+    """
     return [system.speeds[k].name for k in system.free]
 
 
 def fixed_positions(system: System, values: Given) -> dict[str, float]:
-    """Return the given positions as a dict by name.
+    """Return positions of the user as a dict from coordinate name to value.
+
+    Args:
+        system: assembled mechanism.
+        values: positions by name, or those of the independent joints in order [rad or m]; None for
+            none.
 
     Raises:
         ModelError: a sequence does not fit the independent joints.
@@ -60,7 +69,7 @@ def fixed_positions(system: System, values: Given) -> dict[str, float]:
 
 
 def _numbers(values: Any) -> list[float] | None:
-    """Return the elements of a sequence as floats; None if an element is no number."""
+    """Return the elements of the sequence `values` as floats; None if an element is no number."""
     try:
         return None if has_boolean(values) else [float(x) for x in values]
     except (TypeError, ValueError):
@@ -68,7 +77,11 @@ def _numbers(values: Any) -> list[float] | None:
 
 
 def independent_positions(system: System, values: Given) -> list[float]:
-    """Return positions of all independent joints; missing ones from the assembled configuration.
+    """Return positions (m,) of all independent joints; missing ones are those of the assembly.
+
+    Args:
+        system: assembled mechanism.
+        values: positions by name, or in the order of `system.free` [rad or m].
 
     Raises:
         ModelError: a joint is not independent, or a value is not finite.
@@ -112,6 +125,9 @@ def reachable(system: System, loops: Function, q_a: Vector, p: Vector) -> str:
         loops: closed form (q_a, p) -> q, NaN if q_a is unreachable.
         q_a: (m,) positions that cannot be reached.
         p: (np,) parameters.
+
+    Returns:
+        Text such as "j1 can be -1.2 to 1.2 rad".
     """
     texts = []
     for number, k in enumerate(independent_indices(system)):
@@ -164,7 +180,10 @@ def _span(
 def _intervals(
     is_reached: Callable[[float], bool], low: float, high: float
 ) -> list[tuple[float, float]]:
-    """Return the intervals (low, high) of reachable positions in the search interval."""
+    """Return the intervals (low, high) of reachable positions between `low` and `high`.
+
+    `is_reached` returns whether the loops close at a position.
+    """
     points = np.linspace(low, high, _POINTS)
     inside = np.array([is_reached(float(x)) for x in points])
     changes = np.flatnonzero(inside[1:] != inside[:-1])
@@ -174,7 +193,12 @@ def _intervals(
 
 
 def _edge(is_reached: Callable[[float], bool], low: float, high: float) -> float:
-    """Return the limit of reachability between one reachable and one unreachable position."""
+    """Return the limit of reachability between two positions, one reachable and one not.
+
+    `is_reached` returns whether the loops close at a position.
+
+    One of the positions `low` and `high` is reachable. The interval is halved repeatedly.
+    """
     first = is_reached(low)
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
@@ -190,7 +214,7 @@ Branch = str | Sequence[str] | None
 
 
 class LoopFunction(ModelFunction):
-    """Closed form of the loops. A call without a solution raises with the reachable ranges."""
+    """Closed form of the loops as a model. A numeric call without a solution raises Unclosable."""
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Evaluate the closed form.
@@ -222,7 +246,10 @@ class LoopFunction(ModelFunction):
         return (q_a, p) if fits and np.all(np.isfinite(q_a)) and np.all(np.isfinite(p)) else None
 
     def _refusal(self, q_a: Vector, p: Vector) -> str:
-        """Return the error message for unreachable q_a (m,), with the reachable ranges."""
+        """Return the error message for positions q_a (m,) that cannot be reached.
+
+        It contains the reachable ranges of each joint at parameters p (np,).
+        """
         names = independent_names(self.system)
         at = ", ".join(f"{name} = {value:.4g}" for name, value in zip(names, q_a, strict=True))
         return f"{self.system.name}: no configuration on this branch has {at}; " + reachable(
@@ -267,7 +294,13 @@ def function(system: System, branch: Branch = None) -> Function:
 def configuration_on(
     system: System, q_active: Given, branch: Branch, parameters: Mapping[str, float] | None
 ) -> Vector:
-    """Return the configuration (nq,) on a branch for independent positions from the user.
+    """Return the configuration (nq,) on a branch for independent positions of the user.
+
+    Args:
+        system: assembled mechanism.
+        q_active: positions of the independent joints, by name or in order [rad or m].
+        branch: labels of branches; loops without a label keep their assembled branch.
+        parameters: values of symbols by name.
 
     Raises:
         Unclosable: no configuration on the branch has these positions.
@@ -298,7 +331,12 @@ def _configuration(system: System, stages: Sequence[Stage], ways: Sequence[int],
 
 
 def _ways(system: System, stages: Sequence[Stage], branch: Branch) -> tuple[int, ...]:
-    """Return the branch index of each loop; loops without a label keep their assembled branch."""
+    """Return the branch index of each stage; loops without a label keep their assembled branch.
+
+    Raises ModelError for an unknown label.
+
+    `stages` are the solution steps of the loops; `branch` is the label of a branch.
+    """
     labels = _labels(system, branch)
     known = [label for stage in stages for label in stage.labels if label]
     for label in labels:
@@ -310,7 +348,10 @@ def _ways(system: System, stages: Sequence[Stage], branch: Branch) -> tuple[int,
 
 
 def _labels(system: System, branch: Branch) -> list[str]:
-    """Return the branch labels of the user, such as "j3:+", as a list."""
+    """Return the branch labels of the user, such as "j3:+", as a list; empty for None.
+
+    Raises ModelError for another type.
+    """
     if branch is None:
         return []
     given = branch.split(",") if isinstance(branch, str) else branch
@@ -324,7 +365,10 @@ def _labels(system: System, branch: Branch) -> list[str]:
 
 
 def _way(system: System, stage: Stage, labels: Sequence[str]) -> int:
-    """Return the branch index of a loop: the labelled branch, else the assembled branch."""
+    """Return the branch index of a stage: that of its label in `labels`, else of the assembly.
+
+    Raises ModelError if `labels` contains two of its branches.
+    """
     named = [k for k, label in enumerate(stage.labels) if label and label in labels]
     if len(named) > 1:
         raise ModelError(
@@ -350,6 +394,9 @@ def follow_active(system: System) -> Function:
     small equal stages. Newton's method closes each stage from a linear prediction, so that the
     branch of the assembled configuration is kept. The Function is differentiable (implicit function
     theorem). q is NaN if the line leaves the reachable positions.
+
+    Args:
+        system: mechanism with closed loops.
 
     Returns:
         Function of q_a (m, 1) and p (np, 1); q (nq, 1).
@@ -388,7 +435,10 @@ def follow_active(system: System) -> Function:
 
 
 def _merge(system: System, active: list[int], passive: list[int]) -> Function:
-    """Return Function (z, q_a) -> q of passive and independent positions in their order."""
+    """Return Function (z, q_a) -> q that merges passive positions z and independent positions q_a.
+
+    `active` and `passive` are their indices in q.
+    """
     z, q_a = SX.sym("z", len(passive)), SX.sym("q_a", len(active))
     q = SX.zeros(system.nq)
     q[passive], q[active] = z, q_a
@@ -396,7 +446,11 @@ def _merge(system: System, active: list[int], passive: list[int]) -> Function:
 
 
 def _newton(system: System, active: list[int], passive: list[int]) -> Function:
-    """Return ``(z, q_a, p) -> z``: passive positions that close the loops, by Newton's method."""
+    """Return the Function ``(z, q_a, p) -> z`` of Newton's method on the loops.
+
+    z are passive positions; `active` and `passive` are indices in q. A result that has not
+    converged is not marked.
+    """
     q, z, q_a = (
         SX.sym(n, k) for n, k in zip("qza", (system.nq, len(passive), len(active)), strict=True)
     )

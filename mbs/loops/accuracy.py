@@ -89,11 +89,9 @@ def require_accurate(
 
 
 def _refuse(system: System, leads: float) -> None:
-    """Raise SingularPosture that names the independent joints and the sine between constraint rows.
+    """Raise SingularPosture with the names of the independent joints and the sine sqrt(leads).
 
-    Args:
-        system: mechanism with closed loops.
-        leads: smallest squared sine between a row of the passive joints and the rows before it.
+    `leads` is the smallest squared sine between a row of the passive joints and the rows before it.
     """
     names = ", ".join(system.speeds[k].name for k in system.active)
     raise SingularPosture(
@@ -160,7 +158,10 @@ def _floors(
 
 
 def _point(system: System, inputs: Mapping[str, Any]) -> list[Array]:
-    """Return values (nq, n), (m, n) and (np, n) of q, v and p, with the same number of columns."""
+    """Return positions q, independent velocities v and parameters p of some inputs of a model.
+
+    They have shapes (nq, n), (m, n) and (np, n), with the same number n of columns.
+    """
     sizes = {"q": system.nq, "v_a": len(system.active), "p": len(system.parameters)}
     found = [_columns(inputs.get(name, _NO_SYMBOLS), size) for name, size in sizes.items()]
     count = max(values.shape[1] for values in found)

@@ -78,6 +78,9 @@ def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] 
     Raises:
         Unclosable: no configuration closes the loops.
         LoopError: the loops close in one singular configuration only, without motion.
+
+    Returns:
+        System at its assembled configuration, with closure, loops and motors.
     """
     p = closure_parameters(system)
     assembled = assembled_configuration(system, guess, p)
@@ -258,7 +261,7 @@ def _measures(system: System, p: Matrix) -> tuple[Matrix, Matrix]:
 
 
 def _ranks(jacobians: Sequence[Matrix]) -> list[int]:
-    """Return the rank of each Jacobian, relative to the largest singular value of all."""
+    """Return the rank of each of the `jacobians`, relative to the largest singular value of all."""
     values = [np.linalg.svd(_without_zeros(matrix), compute_uv=False) for matrix in jacobians]
     largest = max(float(np.max(row, initial=0.0)) for row in values)
     return [int(np.sum(row > _GAP * largest)) for row in values]

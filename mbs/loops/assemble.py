@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from mbs.assembly import System
+from mbs.assembly.component_instances import guesses_of_unknowns
 from mbs.assembly.open_system import open_system
-from mbs.assembly.parts import guesses_of_unknowns
 from mbs.assembly.variable_names import GUESSES, like_degrees
 from mbs.components import Description
 from mbs.errors import AssemblyError, Unclosable
@@ -85,7 +85,7 @@ def _choose(system: System, active: Sequence[str]) -> tuple[int, ...]:
 
 
 def _laid_over(*guesses: Mapping[str, float]) -> dict[str, float]:
-    """Merge guesses {variable name: position}.
+    """Return the union of guesses, dicts from variable name to position.
 
     A later guess of a coordinate replaces earlier guesses.
     """

@@ -83,7 +83,14 @@ def assembled_configuration(system: System, guess: Mapping[str, float], p: Vecto
 
 
 def rest_positions(system: System, p: Vector) -> dict[int, float]:
-    """Return {index in q: position without spring force [rad or m]} of joints with a spring."""
+    """Return the position at which the spring of a joint has no force [rad or m], by index in q.
+
+    Joints without a spring are left out.
+
+    Args:
+        system: open or closed mechanism.
+        p: (np,) parameters.
+    """
     found = dict[int, float]()
     for link in system.tree.links:
         if link.motion in (Motion.FREE, Motion.SPHERICAL):

@@ -21,7 +21,7 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.parts import ComponentInstance
+from mbs.assembly.component_instances import ComponentInstance
 from mbs.assembly.tables import Balance, LoopRow
 from mbs.assembly.tree import Link
 from mbs.components import Description
@@ -90,8 +90,11 @@ def balance_rows(system: System, q: SX) -> list[tuple[str, list[tuple[str, Row]]
     """Return the force balances of undamped massless nodes, divided by typical stiffnesses.
 
     Args:
-        system: a system with or without massless nodes.
+        system: mechanism with or without massless nodes.
         q: (nq, 1) symbols of positions.
+
+    Returns:
+        At most one pair: name of the group, and (name of the node, row) of each balance.
     """
     return _rows(system, q, SX.zeros(system.nv), is_damped=False)
 
@@ -99,13 +102,15 @@ def balance_rows(system: System, q: SX) -> list[tuple[str, list[tuple[str, Row]]
 def velocity_balance_rows(system: System, q: SX, v: SX) -> list[tuple[str, list[tuple[str, Row]]]]:
     """Return the force balances of damped massless nodes, which are zero in every motion.
 
-    Each is divided by a typical damping of its node, and is linear in v with a constant part. The
-    result has the name of the group of rows, and for each row the name of the node and the value.
+    Each is divided by a typical damping of its node, and is linear in v with a constant part.
 
     Args:
-        system: a system with or without massless nodes.
+        system: mechanism with or without massless nodes.
         q: (nq, 1) symbols of positions.
         v: (nv, 1) velocities.
+
+    Returns:
+        At most one pair: name of the group, and (name of the node, row) of each balance.
     """
     return _rows(system, q, v, is_damped=True)
 
@@ -169,7 +174,10 @@ def require_no_drift(system: System, what: str, velocities: Iterable[int]) -> No
 
 
 def _limit(system: System, names: Sequence[str], q: SX) -> SX:
-    """Return the sum (1, 1) of the limits [N or N m] of the dry frictions of these components."""
+    """Return the sum of the largest dry-friction forces of some components, (1, 1) [N or N m].
+
+    `names` are the names of the components; friction is evaluated at positions q and at rest.
+    """
     at, total = PartsAt(system, q, SX.zeros(system.nv)), SX(0)
     for part in system.parts:
         if part.name in names:
@@ -201,7 +209,13 @@ def require_no_balance(
 
 
 def without_values(system: System) -> str:
-    """Return a hint that parameters without value prevent the search of massless nodes, or ""."""
+    """Return a hint for an error message that massless nodes need values of parameters.
+
+    It is empty if all parameters have values, or no coordinate moves without mass.
+
+    Args:
+        system: mechanism whose massless nodes were searched.
+    """
     missing = [parameter.name for parameter in system.parameters if parameter.default is None]
     nodes = [system.speeds[system.tree.links[j].v.start].name for j in _massless_links(system)]
     if system.nodes or not nodes or not missing:
@@ -289,9 +303,9 @@ def _joint(system: System, link: int) -> str:
 
 
 def _massless_links(system: System) -> list[int]:
-    """Return indices of links with one freedom whose joint moves no inertia and is in no loop.
+    """Return indices of links whose single joint freedom moves no inertia and is in no loop.
 
-    A link counts if all its descendants are massless too. Empty if all links are massless.
+    All descendants of such a link are massless too. Empty if all links are massless.
     """
     links = system.tree.links
     bound = {name for loop in system.loops for name in loop.joints}
@@ -332,11 +346,8 @@ def _static_efforts(system: System, q: SX, v: SX) -> SX:
 def _balances(system: System, nodes: Sequence[tuple[int, int]]) -> tuple[Balance, ...] | None:
     """Return the force balances that determine the motion of massless nodes; None if they do not.
 
-    Forces on nodes must be linear in velocities, and may depend on positions and parameters.
-
-    Args:
-        system: mechanism with massless nodes.
-        nodes: (index in q, index in v) of each massless node.
+    `nodes` are pairs (index in q, index in v). Forces on nodes must be linear in velocities, and
+    may depend on positions and parameters.
     """
     positions, velocities = [k for k, _ in nodes], [k for _, k in nodes]
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
@@ -418,7 +429,7 @@ def _same(one: SX, other: SX) -> bool:
 
 
 def _motion(law: Friction | Stop | OneWay) -> list[SX]:
-    """Return the variable that switches a law: gap of a stop, or velocity of any other element."""
+    """Return the variable on which a law switches: gap of a stop, velocity of other elements."""
     if isinstance(law, Stop):
         return [SX(law.gap)]
     return [SX(law.slip if isinstance(law, Friction) else law.velocity)]
@@ -459,7 +470,7 @@ def _without_velocities(efforts: SX, D: SX, damped: Sequence[int], others: Seque
 
 
 def _samples(system: System, q: SX, matrix: SX) -> list[NDArray[np.float64]]:
-    """Return the finite numeric values of a matrix expression at eight random configurations."""
+    """Return finite numeric values of a matrix expression of q at eight random configurations."""
     function = Function("matrix", [q, system.p], [casadi.densify(matrix)])
     rng = np.random.default_rng(_SEED)
     at = np.array(system.configuration) + rng.uniform(-_REACH, _REACH, (8, system.nq))

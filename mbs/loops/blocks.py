@@ -27,7 +27,7 @@ from mbs.closed_forms.arm_certificate import (
     certified_configurations,
 )
 from mbs.closed_forms.arm_search import general_of
-from mbs.closed_forms.hexapod import LEGS, holds, poses
+from mbs.closed_forms.hexapod import LEGS, is_rigid, poses
 from mbs.closed_forms.planar_loops import KNOWN, PlanarLoops, planar_roots
 from mbs.closed_forms.ring import (
     PARAMETERS,
@@ -106,7 +106,7 @@ def _block(work: PlanWork, waiting: Sequence[int]) -> LoopBlock | None:
 
 
 def _assembled(system: System) -> tuple[Vector, Vector]:
-    """Return all positions and the parameters p of the assembled configuration."""
+    """Return all positions (cut joints: zero) and p (np,) of the assembled configuration."""
     q = np.array(system.configuration)
     return started_at(system, q, range(system.nq)), closure_parameters(system)
 
@@ -231,7 +231,14 @@ _SAME_ANGLE = 1e-9
 
 
 def gear_trains(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
-    """Yield blocks of coaxial loops and couplings that share unknown joints: differentials, ..."""
+    """Yield blocks of loops of coaxial revolute joints and couplings, such as differentials.
+
+    The loops of a block share unknown joints.
+
+    Args:
+        work: state of the plan: known positions and solved loops.
+        waiting: indices of the unsolved loops and couplings.
+    """
     system, first = work.system, len(work.system.cuts)
     rings = {
         number: work.ring(number)
@@ -319,12 +326,10 @@ class _GearTrain:
         return _GearTrain(indices, places, len(rings), equations)
 
     def roots(self, q: Vector, p: Vector) -> Roots:
-        """Return all solutions x for known positions q and parameters p.
+        """Return all solutions x for known positions q (all positions) and parameters p (np,).
 
-        Angles of joints in loops are within half a rotation of zero.
-
-        Raises:
-            NoClosedForm: the equations do not determine all unknown positions.
+        Angles of joints in loops are within half a rotation of zero. Raises NoClosedForm if the
+        equations do not determine all unknown positions.
         """
         A, b = (np.array(value) for value in self.equations(q, p))
         if rank(A, _LOCKED) < len(self.indices):
@@ -351,7 +356,10 @@ class _GearTrain:
 
 
 def _coaxial_row(ring: Ring, q: SX) -> SX:
-    """Return the closure error of a loop of coaxial revolute joints: angle [rad] as expression."""
+    """Return the closure error of a loop of coaxial revolute joints: angle [rad] as expression.
+
+    q is the vector of all positions.
+    """
     angle, turned, sense = SX(0), SX.eye(3), SX(1)
     for joint, gap in zip(ring.joints, [*ring.gaps[1:], ring.gaps[0]], strict=True):
         angle += sense * joint.sign * q[_index(joint)]
@@ -370,7 +378,12 @@ structural, and seed of the random numbers."""
 
 
 def planar_blocks(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
-    """Yield blocks of plane loops: all loops that share unknown joints, then smaller subsets."""
+    """Yield blocks of plane loops: all loops that share unknown joints, then smaller subsets.
+
+    Args:
+        work: state of the plan: known positions and solved loops.
+        waiting: indices of the unsolved loops and couplings.
+    """
     links = {
         number: _unknown_links(work, number)
         for number in waiting
@@ -404,7 +417,10 @@ def _some(numbers: list[int], links: dict[int, set[int]]) -> Iterator[list[int]]
 
 
 def _is_flat_kind(work: PlanWork, number: int) -> bool:
-    """Whether a loop can be plane: unknown joints revolute or prismatic, closed by no rod."""
+    """Whether a loop can be plane: unknown joints revolute or prismatic, closed by no rod.
+
+    `number` is the index of the cut joint of the loop.
+    """
     if is_bound(work.system, number) or isinstance(work.system.cuts[number].edge.joint, Rod):
         return False
     links = work.system.tree.links
@@ -457,11 +473,14 @@ class _Plane:
         return plane
 
     def drawing(self, q: Vector, p: Vector) -> _Drawing | None:
-        """Return the loops as equations in their plane at known positions q; None if not plane."""
+        """Return the equations of the loops in their plane at known positions q, or None."""
         return _draw(self, _side_by_side(self.frames, q, p))
 
     def roots(self, q: Vector, p: Vector) -> Roots:
-        """Return all solutions of the loops at known positions q and parameters p."""
+        """Return all solutions of loops at known positions q (all positions), parameters p (np,).
+
+        Raises NoClosedForm if the loops are not plane there.
+        """
         drawing = self.drawing(q, p)
         if drawing is None:
             raise NoClosedForm(
@@ -502,7 +521,7 @@ class _Drawing:
     joints: list[tuple[int, _Turn, _Turn] | int]
 
     def positions(self, theta: Vector, s: Vector) -> Vector:
-        """Return (r, k) joint positions [rad or m] of r roots: angles theta, displacements s."""
+        """Return joint positions (r, k) [rad or m] at r roots: angles theta, displacements s."""
         whole = np.concatenate([theta, np.zeros((len(theta), 1))], axis=1)
         values = np.empty((len(theta), len(self.joints)))
         for k, joint in enumerate(self.joints):
@@ -588,7 +607,7 @@ class _Draughtsman:
         raise _Bent
 
     def vector(self, value: Vector) -> complex:
-        """Return the components of a vector (3,) in the plane as a complex number."""
+        """Return the components of a vector (3,) in the plane, as real and imaginary part."""
         return complex(self.x @ value, self.y @ value)
 
     def drawing(self) -> _Drawing:
@@ -778,7 +797,12 @@ joints move by themselves: the roots are accurate to 1e-12, and 1e-6 is its squa
 
 
 def single_loops(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
-    """Yield blocks of one loop of 3 to 6 joints, solved as the inverse kinematics of an arm."""
+    """Yield blocks of one loop of 3 to 6 joints, solved as the inverse kinematics of an arm.
+
+    Args:
+        work: state of the plan: known positions and solved loops.
+        waiting: indices of the unsolved loops and couplings.
+    """
     for number in waiting:
         if number >= len(work.system.cuts) or is_bound(work.system, number):
             continue
@@ -826,7 +850,7 @@ class _SingleLoop:
         )
 
     def roots(self, q: Vector, p: Vector) -> Roots:
-        """Return all positions (r, n) of the loop's unknown joints at known positions q."""
+        """Return all positions (r, n) of joints of the loop at known positions q, parameters p."""
         gaps = _side_by_side(self.gaps, q, p)
         signs = np.array([joint.sign for joint in self.joints])
         n = len(self.joints)
@@ -835,7 +859,10 @@ class _SingleLoop:
         return replace(found, values=q * signs)
 
     def is_locked(self, q: Vector, p: Vector) -> bool:
-        """Whether known positions fix all joints of the loop (all its solutions are regular)."""
+        """Whether the joints of the loop cannot move at known positions q and parameters p.
+
+        All solutions are then regular.
+        """
         try:
             roots = self.roots(q, p)
         except NoClosedForm:
@@ -888,7 +915,12 @@ def _added_gaps(count: int, size: float) -> Matrix:
 
 
 def platforms(work: PlanWork, waiting: Sequence[int]) -> Iterator[LoopBlock]:
-    """Yield a block for each platform on six legs among the unsolved loops."""
+    """Yield a block for each platform on six legs among the unsolved loops.
+
+    Args:
+        work: state of the plan: known positions and solved loops.
+        waiting: indices of the unsolved loops and couplings.
+    """
     system = work.system
     for numbers, links in _free_groups(work, waiting):
         hexapod = _Hexapod.of(work, numbers, links)
@@ -916,7 +948,11 @@ _BALL = Freedom(Motion.SPHERICAL)
 
 
 def _edges(work: PlanWork, numbers: list[int], links: list[int]) -> tuple[list[_Edge], Function]:
-    """Return a block's joints and a Function (all positions, p) -> their frames in one row."""
+    """Return the joints of a block between rigid groups, and a Function of their frames.
+
+    `numbers` are the cut joints and `links` the child links of the unknown joints. The Function
+    maps (all positions, p) to frames (4, 4) in one row of blocks.
+    """
     groups, system = _groups(work), work.system
     edges, placed = list[_Edge](), [Pose.identity()]
 
@@ -1002,7 +1038,13 @@ _LEAST = 5
 
 
 class _Axis(NamedTuple):
-    """Passive joint of a leg at position zero: spherical centre, or axis through a point."""
+    """Passive joint of a leg at position zero.
+
+    Attributes:
+        motion: type of the joint.
+        point: (3,) centre of a spherical joint, or point on the axis, in the base frame [m].
+        along: (3,) direction of the axis in the base frame.
+    """
 
     motion: Motion
     point: Vector
@@ -1102,7 +1144,10 @@ class _Hexapod:
 
     @staticmethod
     def of(work: PlanWork, numbers: list[int], links: list[int]) -> _Hexapod | None:
-        """Return the platform of some loops; None unless they form a platform on six legs."""
+        """Return the platform of loops `numbers` with unknown joints at `links`.
+
+        None unless they form a platform on six legs.
+        """
         system = work.system
         edges, frames = _edges(work, numbers, links)
         # a free joint between ground and platform only defines the pose and constrains nothing
@@ -1131,7 +1176,8 @@ class _Hexapod:
     def roots(self, q: Vector, p: Vector) -> Roots:
         """Return positions of the unknown joints at all poses of the platform.
 
-        Each joint of a leg has the branch in which the system was assembled.
+        Each joint of a leg has the branch in which the system was assembled. q are all positions,
+        of which the known ones count; p (np,) are the parameters.
         """
         frames = _side_by_side(self.frames, q, p)
         kept = [_distance(leg, frames) for leg in self.legs]
@@ -1177,7 +1223,9 @@ def _require_held(work: PlanWork, waiting: Sequence[int]) -> None:
             continue
         at = _side_by_side(frames, *_assembled(system))
         legs = [leg for leg in (_distance(leg, at, slides=True) for leg in found[1]) if leg]
-        if len(legs) == LEGS and not holds(*(np.array([leg[k] for leg in legs]) for k in (0, 1))):
+        if len(legs) == LEGS and not is_rigid(
+            *(np.array([leg[k] for leg in legs]) for k in (0, 1))
+        ):
             raise NoClosedForm(
                 f"{system.name}: the ends of its six legs lie so that they hold the platform at no"
                 " pose, as on similar hexagons, and the length of one leg follows from the others;"
@@ -1186,6 +1234,9 @@ def _require_held(work: PlanWork, waiting: Sequence[int]) -> None:
 
 
 def _side_by_side(frames: Function, q: Vector, p: Vector) -> Matrix:
-    """Return (k, 4, 4) frames from a Function that returns them in one row of blocks."""
+    """Return the frames (k, 4, 4) of a Function that returns them in one row of blocks.
+
+    q are all positions, p (np,) the parameters.
+    """
     values = np.array(frames(q, p))
     return values.T.reshape(-1, 4, 4).transpose(0, 2, 1)

@@ -41,6 +41,9 @@ def mechanism_size(system: System) -> SX:
     The configurations of this evaluation are fixed and in general open, so that the size is known
     before a loop is closed. It is 1 m if the mechanism has no length.
 
+    Args:
+        system: mechanism with loops.
+
     Returns:
         (1, 1) expression of the parameters p.
     """
@@ -67,7 +70,13 @@ def mechanism_size(system: System) -> SX:
 
 
 def row_sizes(system: System) -> SX:
-    """Return the unit of each closure row (m, 1) [m or 1], as an expression of p."""
+    """Return the unit of each closure row, (m, 1), as an expression of p.
+
+    It is the size of the mechanism [m] for a length, and 1 for a cosine.
+
+    Args:
+        system: mechanism with loops.
+    """
     size = mechanism_size(system)
     return casadi.vertcat(SX(0, 1), *(size if own else SX(1) for own in _lengths(system)))
 
@@ -83,14 +92,26 @@ def distance_units(units: Iterable[str], size: float) -> Vector:
 
 
 def constraint_sizes(system: System) -> SX:
-    """Return the unit of each row of J (m, 1): closure rows, then velocity rows [m or 1]."""
+    """Return the unit of each constraint row, (m, 1), as an expression of p.
+
+    Closure rows come first, then velocity rows. The unit is the size of the mechanism [m] for
+    lengths, else 1.
+
+    Args:
+        system: mechanism with loops.
+    """
     slips = velocity_row_units(system)
     size = mechanism_size(system)
     return casadi.vertcat(row_sizes(system), *(size if u == "m" else SX(1) for u in slips))
 
 
 def relative_rows(system: System, q: SX) -> SX:
-    """Return closure rows divided by their units, then quaternion norm rows, (m + k, 1)."""
+    """Return dimensionless closure rows, then quaternion norm rows, (m + k, 1).
+
+    Args:
+        system: mechanism with loops.
+        q: (nq, 1) positions.
+    """
     return casadi.vertcat(closure_rows(system, q) / row_sizes(system), norm_rows(system.tree, q))
 
 
@@ -185,7 +206,11 @@ class Closing:
         return [k for k in range(self.system.nq) if k not in locked]
 
     def rows(self, q: Vector) -> tuple[Vector, Vector]:
-        """Return the residual (m,) and its derivative by the free positions (m, n)."""
+        """Return the residual (m,) and its derivative by the free positions (m, n).
+
+        Args:
+            q: (nq,) positions.
+        """
         r, J = self._functions().equations(q, self._given)
         if self.kept is not None:
             r, J = r[list(self.kept)], J[list(self.kept)]
@@ -198,7 +223,7 @@ class Closing:
 
     @property
     def sizes(self) -> Vector:
-        """(m,) units of the rows: the size of the mechanism for lengths [m], or 1."""
+        """Divisors (m,) that make the rows dimensionless: mechanism size [m] for lengths, or 1."""
         sizes = self._sizes[1].ravel()
         return sizes if self.kept is None else sizes[list(self.kept)]
 
@@ -219,19 +244,31 @@ class Closing:
         return found
 
     def openness(self, q: Vector) -> float:
-        """Return the largest row at q (nq,), in sizes of the mechanism."""
+        """Return the largest closure error, in sizes of the mechanism.
+
+        Args:
+            q: (nq,) positions.
+        """
         return float(np.max(np.abs(self.rows(q)[0]) / self.sizes, initial=0.0))
 
     def nearest(self, q: Vector) -> Closed:
-        """Return the result of Gauss-Newton from q (nq,)."""
+        """Return the result of Gauss-Newton, which changes the free positions to close the loops.
+
+        Args:
+            q: (nq,) start. Its locked positions are kept.
+        """
         tolerance = TOLERANCE * self.sizes
         found, root = self._newton().near(q, self._given, self.free, tolerance)
         return Closed(found, root.residual, root.converged and self.faces(found))
 
     def polished(self, q: Vector, steps: int) -> Vector:
-        """Return q (nq,) after `steps` minimum-norm Newton steps, closed to rounding.
+        """Return a configuration closed to rounding, by minimum-norm Newton steps.
 
         `nearest` ends at `TOLERANCE`, above the rounding of the rows.
+
+        Args:
+            q: (nq,) nearly closed configuration.
+            steps: number of Newton steps.
         """
         found, free = np.array(q, dtype=float), self.free
         for _ in range(steps):
@@ -269,12 +306,20 @@ class Closing:
         return acting
 
     def faces(self, q: Vector) -> bool:
-        """Whether no axis of a closing joint is opposed at q (nq,)."""
+        """Whether no axis of a closing joint points the opposite way.
+
+        Args:
+            q: (nq,) positions.
+        """
         cosines = self._functions().facing(q, self._given)[0]
         return bool(np.all((cosines if self.axes is None else cosines[list(self.axes)]) > 0))
 
     def gap(self, q: Vector) -> str:
-        """Return the joint with the largest closure error at q, and the error, as text."""
+        """Return text on the joint with the largest closure error, and the error.
+
+        Args:
+            q: (nq,) positions.
+        """
         units = [(name, unit) for name, _, unit in position_rows(self.system)]
         gaps: dict[str, list[float]] = {}
         for (name, unit), value in zip(units, self.rows(q)[0], strict=False):
@@ -286,7 +331,11 @@ class Closing:
         return f"{name} open by {distance:.3g} m and {other:.3g} in direction cosines"
 
     def locked_positions(self, q: Vector) -> str:
-        """Return the locked positions at q as text; empty if no position is locked."""
+        """Return names and values of the locked positions as text; empty if no position is locked.
+
+        Args:
+            q: (nq,) positions.
+        """
         names = [coordinate.name for coordinate in self.system.coordinates]
         return ", ".join(f"{names[k]} = {q[k]:.4g}" for k in self.locked)
 
@@ -335,7 +384,11 @@ class ClosingFunctions(NamedTuple):
 
 
 def closure_parameters(system: System, values: Mapping[str, float] | None = None) -> Vector:
-    """Return values (np,) of the parameters; NaN if one has no value and is not in the closure.
+    """Return values (np,) of the parameters; NaN for one without value on which no loop depends.
+
+    Args:
+        system: mechanism with or without loops.
+        values: values by name; others are default values.
 
     Raises:
         ModelError: a name is unknown, or a parameter of the closure has no value.
@@ -423,12 +476,28 @@ def _replace(q: Vector, indices: Sequence[int], values: Vector) -> Vector:
 
 
 def difference(system: System, q: Vector, other: Vector) -> Vector:
-    """Return q - other (nq,), angles within half a rotation, quaternions up to their sign."""
+    """Return the difference q - other of two configurations (nq,).
+
+    Angles are within half a rotation of zero, and quaternions have the nearer sign.
+
+    Args:
+        system: mechanism with these coordinates.
+        q: (nq,) first configuration.
+        other: (nq,) second configuration.
+    """
     return row_difference(system.coordinates, q, other)
 
 
 def row_difference(rows: Sequence[Coordinate], q: Vector, other: Vector) -> Vector:
-    """Return q - other (n,) for any coordinates; angles are within half a rotation of zero."""
+    """Return the difference q - other (n,) of the positions of any coordinates.
+
+    Angles are within half a rotation of zero, and quaternions have the nearer sign.
+
+    Args:
+        rows: the n coordinates.
+        q: (n,) first positions.
+        other: (n,) second positions.
+    """
     gap = _within_half_turn(rows, q - other)
     for first in [k for k, row in enumerate(rows) if row.kind == "quaternion"][::4]:
         part = slice(first, first + 4)
@@ -438,12 +507,17 @@ def row_difference(rows: Sequence[Coordinate], q: Vector, other: Vector) -> Vect
 
 
 def within_half_turn(system: System, q: Vector) -> Vector:
-    """Return positions (nq,), or their differences, with angles within half a rotation of zero."""
+    """Return positions (nq,), or their differences, with angles within half a rotation of zero.
+
+    Args:
+        system: mechanism with these coordinates.
+        q: (nq,) positions.
+    """
     return _within_half_turn(system.coordinates, q)
 
 
 def _within_half_turn(rows: Sequence[Coordinate], q: Vector) -> Vector:
-    """Return values of coordinates (n,) with angles within half a rotation of zero."""
+    """Return the values q (n,) of the coordinates `rows`, with angles within [-pi, pi]."""
     turned = np.array(q, dtype=float)
     turns = np.array([row.unit == "rad" for row in rows], dtype=bool)
     turned[turns] = np.remainder(turned[turns] + np.pi, 2 * np.pi) - np.pi
@@ -516,13 +590,13 @@ class _Line:
     scales: Vector
 
     def closing(self, s: float) -> Closing:
-        """Return the closure rows with the parameters of path position s."""
+        """Return the closure rows with the parameters at arc length s of the path."""
         first, last = self.parameters
         p = last if s == self.length else first + s / self.length * (last - first)
         return Closing(self.system, p, self.locked)
 
     def placed(self, q: Vector, s: float) -> Vector:
-        """Return the configuration q (nq,) with its locked positions moved to path position s."""
+        """Return configuration q (nq,) with its locked positions at arc length s of the path."""
         (first, last), indices = self.ends, list(self.locked)
         if s == self.length:
             at = last
@@ -534,7 +608,7 @@ class _Line:
         return _replace(q, indices, at[indices])
 
     def slope(self, q: Vector, s: float) -> Vector | None:
-        """Return the tangent dq/ds (nq,) of the branch at a closed q; None if it turns there."""
+        """Return the tangent dq/ds (nq,) at a closed q, path length s; None at a turning point."""
         if 0 < len(self.closing(s).free) < MANY:
             return self._exact_slope(q, s)
         ahead = s + _OFFSET if s + _OFFSET <= self.length else s - _OFFSET
@@ -545,7 +619,7 @@ class _Line:
         return slope if np.max(np.abs(slope / self.scales), initial=0.0) < _STEEP else None
 
     def _exact_slope(self, q: Vector, s: float) -> Vector | None:
-        """Return the tangent dq/ds (nq,) from derivatives of the rows.
+        """Return the tangent dq/ds (nq,) at a closed q, arc length s, from derivatives of the rows.
 
         It is accurate near singular branches. None if q is singular or the slope too steep.
         """
@@ -561,9 +635,9 @@ class _Line:
         return slope if np.max(np.abs(slope / self.scales), initial=0.0) < _STEEP else None
 
     def _shortest(self, q: Vector, s: float, rows: Vector) -> Vector | None:
-        """Return the smallest change (nq,) of free positions that changes the rows by `rows`.
+        """Return the smallest change (nq,) of free positions that changes the rows by `rows` (m,).
 
-        None if the closure is singular at q.
+        q is closed at arc length s. None if the closure is singular there.
         """
         closing = self.closing(s)
         scales = self.scales[closing.free]
@@ -602,9 +676,10 @@ class _Line:
         return q
 
     def side(self, q: Vector, s: float) -> float:
-        """Return the sign of det of the closure Jacobian by free positions; 0 if it is not square.
+        """Return the sign of det of the closure Jacobian by free positions at q, arc length s.
 
-        The sign changes if a continuation passes a singular configuration.
+        It is 0 if the Jacobian is not square. The sign changes if a continuation passes a singular
+        configuration.
         """
         closure, closing = self.system.closure, self.closing(s)
         free = closing.free
@@ -625,7 +700,7 @@ class _Line:
         return [first + k for k, part in enumerate(parts) if not locked >= set(part)]
 
     def is_singular(self, q: Vector, s: float) -> bool:
-        """Whether the loops do not determine the free positions at q to first order."""
+        """Whether the free positions at q, path length s, are undetermined to first order."""
         closing = self.closing(s)
         if not 0 < len(closing.free) < MANY:
             return False
@@ -856,10 +931,15 @@ def _ended(line: _Line, q: Vector, s: float, what: str) -> str:
 
 
 def unwound(closing: Closing, q: Vector, start: Vector) -> Vector:
-    """Return q with angles within half a rotation of the start, if that closes the loops; else q.
+    """Return a closed configuration with angles within half a rotation of a start.
 
     A quaternion gets the sign nearer to the start. If both signs are equally near, its first
-    nonzero element is positive.
+    nonzero element is positive. q is returned unchanged if the loops were then open, as with gears.
+
+    Args:
+        closing: closure rows and the locked positions.
+        q: (nq,) closed configuration.
+        start: (nq,) configuration to which angles are near.
     """
     near: Vector = start + difference(closing.system, q, start)
     for part in quaternion_slices(closing.system.tree):

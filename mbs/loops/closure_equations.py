@@ -52,9 +52,15 @@ def cut_twist(system: System, pose: Pose, q: SX, v: SX) -> tuple[SX, SX]:
 
 
 def slip_rows(system: System, q: SX) -> list[tuple[str, SX]]:
-    """Return (name, rows (k, nv)) of all constraints on velocities only: J such that J v + g = 0.
+    """Return all constraints on velocities only, as rows J (k, nv) of J v + g = 0.
 
-    They belong to rolling discs (no slip), components, and massless nodes with dampers.
+    Args:
+        system: mechanism with loops.
+        q: (nq, 1) symbols of positions.
+
+    Returns:
+        Pairs of a name and rows. They belong to rolling discs (no slip), components, and massless
+        nodes with dampers.
     """
     v = SX.sym("v", system.nv)
     result = []
@@ -74,13 +80,22 @@ def slip_rows(system: System, q: SX) -> list[tuple[str, SX]]:
 
 
 def drift_rows(system: System, q: SX) -> SX | None:
-    """Return the constant part g of the velocity rows of damped massless nodes, or None."""
+    """Return the constant part g of the velocity rows of damped massless nodes; None without nodes.
+
+    Args:
+        system: mechanism with loops.
+        q: (nq, 1) symbols of positions.
+    """
     rows = velocity_balance_rows(system, q, SX.zeros(system.nv))
     return casadi.vertcat(*(row.value for _, row in rows[0][1])) if rows else None
 
 
 def least_upright(system: System) -> Function:
-    """Return ``upright(q, p)``: smallest sine of the angle between a rolling disc and its plane."""
+    """Return ``upright(q, p)``: smallest sine of the angle between a rolling disc and its plane.
+
+    Args:
+        system: mechanism with at least one rolling disc.
+    """
 
     def build() -> Function:
         q = SX.sym("q", system.nq)
@@ -95,19 +110,33 @@ def least_upright(system: System) -> Function:
 
 
 def rolling_discs(system: System) -> Iterator[tuple[Cut, RollingDisc]]:
-    """Yield the cut joint and the component of each rolling disc."""
+    """Yield the cut joint and the component of each rolling disc.
+
+    Args:
+        system: mechanism with or without rolling discs.
+    """
     for cut in system.cuts:
         if isinstance(cut.edge.joint, RollingDisc):
             yield cut, cut.edge.joint
 
 
 def pose_on_plane(system: System, q: SX, cut: Cut, disc: RollingDisc) -> Pose:
-    """Return frame_b of a rolling disc relative to axes at frame_a with z normal to the plane."""
+    """Return frame_b of a rolling disc relative to axes at frame_a with z normal to the plane.
+
+    Args:
+        system: mechanism with the disc.
+        q: (nq, 1) positions.
+        cut: cut joint of the disc.
+        disc: component of the disc.
+    """
     return disc.on_plane(relative_pose(system.tree, q, *cut.frames))
 
 
 def closure_residual(system: System) -> Function:
     """Return ``closure(q) -> phi``: the closure residual, zero if all loops are closed.
+
+    Args:
+        system: mechanism with closed loops.
 
     Returns:
         Function of q (nq, 1); phi (m, 1) [m or 1], one element for each label of
@@ -122,13 +151,26 @@ def closure_residual(system: System) -> Function:
 
 
 def closure_rows(system: System, q: SX) -> SX:
-    """Return all closure rows (m, 1) at the positions q (nq, 1)."""
+    """Return all closure rows, (m, 1) [m or 1], dependent rows included.
+
+    Args:
+        system: mechanism with loops.
+        q: (nq, 1) positions.
+    """
     found = _equations(system)
     return casadi.substitute(found.rows, found.q, q)
 
 
 def independent_closure(system: System, q: SX) -> SX:
-    """Return the independent closure rows (r, 1), selected by the loop analysis, at symbols q."""
+    """Return the independent closure rows, (r, 1) [m or 1], as selected by the loop analysis.
+
+    Args:
+        system: mechanism with closed loops.
+        q: (nq, 1) symbols of positions.
+
+    Raises:
+        ModelError: the system is an open chain.
+    """
     if system.closure is None:
         raise ModelError(f"{system.name}: an open chain has no closure; use the open-chain models")
     return closure_rows(system, q)[list(system.closure.rows)]
@@ -171,7 +213,11 @@ class RowGroup:
 
 
 def row_groups(system: System) -> tuple[RowGroup, ...]:
-    """Return the rows of all loops, couplings and components, in their order."""
+    """Return the constraint rows of all loops, couplings and components, in their order.
+
+    Args:
+        system: mechanism with loops.
+    """
 
     def build() -> tuple[RowGroup, ...]:
         slips = {
@@ -193,12 +239,20 @@ def row_groups(system: System) -> tuple[RowGroup, ...]:
 
 
 def position_rows(system: System) -> list[tuple[str, str, str]]:
-    """Return group name, label and unit of each row that constrains positions."""
+    """Return (group name, label, unit) of each row that constrains positions.
+
+    Args:
+        system: mechanism with loops.
+    """
     return [(g.name, label, unit) for g in row_groups(system) for label, unit in g.positions]
 
 
 def velocity_row_units(system: System) -> list[str]:
-    """Return the unit of each velocity row, integrated over time: "m" for m/s."""
+    """Return the unit of each velocity row after integration over time: "m" for m/s.
+
+    Args:
+        system: mechanism with loops.
+    """
     return [unit for group in row_groups(system) for _, unit in group.velocities]
 
 
@@ -261,6 +315,10 @@ def facing(system: System, q: SX) -> SX:
 
     The rows of a joint with an axis are zero for opposed axes too. Only a configuration with
     positive cosines is correct.
+
+    Args:
+        system: mechanism with loops.
+        q: (nq, 1) positions.
     """
     found = _equations(system)
     return casadi.substitute(found.cosines, found.q, q)

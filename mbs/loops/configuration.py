@@ -205,7 +205,7 @@ def _with_dependent_positions(
 
 
 def _with_positions(q: Vector, target: Vector, indices: Sequence[int]) -> Vector:
-    """Return q with the positions at `indices` replaced by the target's positions."""
+    """Return a copy of q with the positions at `indices` of `target`; all are (nq,)."""
     result = q.copy()
     result[list(indices)] = target[list(indices)]
     return result
@@ -278,6 +278,11 @@ def require_closed(
     system: System, q: Vector, parameters: Mapping[str, float] | None = None
 ) -> None:
     """Raise if a configuration does not close the loops.
+
+    Args:
+        system: mechanism with closed loops.
+        q: (nq,) positions.
+        parameters: values of symbols by name.
 
     Raises:
         LoopError: the loops are open. The message contains the closure error.
@@ -360,7 +365,19 @@ def start_position(
     parameters: Mapping[str, float] | None,
     guess: Guess = None,
 ) -> Vector:
-    """Return initial positions (nq,) that close the loops, with the arguments of `start`."""
+    """Return initial positions (nq,) that close the loops.
+
+    Args:
+        system: open or closed mechanism.
+        q0: positions by name [rad or m], or a `State`; see `start`.
+        parameters: values of symbols by name.
+        guess: approximate positions of other joints, which select the branch.
+
+    Raises:
+        Unclosable: the loops cannot be closed at these positions.
+        LoopError: q0 contains all positions and leaves the loops open.
+        ModelError: an argument is invalid.
+    """
     given: Values = system.plain_names(positions_of(q0), POSITIONS)
     if guess is not None and not isinstance(given, Mapping | None):
         raise ModelError(
@@ -382,10 +399,16 @@ def start_position(
 def start_velocity(
     system: System, q: Vector, v0: Values, parameters: Mapping[str, float] | None
 ) -> Vector:
-    """Return initial velocities (nv,) at the closed positions q, with the arguments of `start`.
+    """Return initial velocities (nv,) that keep the loops closed.
 
-    They are the smallest velocities that keep the loops closed and agree with v0. Joints with
-    springs stay at rest if the loops allow it.
+    They are the smallest velocities that agree with v0. Joints with springs stay at rest if the
+    loops allow it.
+
+    Args:
+        system: open or closed mechanism.
+        q: (nq,) positions that close the loops.
+        v0: velocities by name [rad/s or m/s], or all of them; see `start`.
+        parameters: values of symbols by name.
 
     Raises:
         ModelError: the loops allow no motion with these velocities.
@@ -477,7 +500,7 @@ def smallest_velocity(
 
 
 def _less(system: System, v0: Values, own: Vector) -> Values:
-    """Return velocities v0 (by name or as a list) minus `own` (nv,) in the same format.
+    """Return velocities v0, by name or as a list, minus `own` (nv,), in the same format.
 
     None stays None.
     """

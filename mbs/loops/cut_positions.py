@@ -19,8 +19,12 @@ from mbs.spatial import Pose, cross
 def cut_positions(system: System) -> Function:
     """Return ``cut_positions(q, p) -> c``: positions of cut joints [rad, m, quaternion].
 
-    The order is that of `system.cut_coordinates`. Angles are between -pi and pi. The first element
-    of a quaternion is not negative.
+    Args:
+        system: mechanism with loops.
+
+    Returns:
+        Function of q (nq, 1) and p (np, 1). The order of c is that of `system.cut_coordinates`.
+        Angles are between -pi and pi. The first element of a quaternion is not negative.
     """
 
     def build() -> Function:
@@ -46,7 +50,11 @@ def cut_positions(system: System) -> Function:
 
 
 def cut_positions_and_slopes(system: System) -> OnArrays:
-    """Return ``(q, p) -> c, s``: positions (c,) of cut joints, and their derivative (c, nq)."""
+    """Return ``(q, p) -> c, s`` of arrays: positions (c,) of cut joints, and derivative (c, nq).
+
+    Args:
+        system: mechanism with loops.
+    """
 
     def build() -> OnArrays:
         q, p = SX.sym("q", system.nq), SX.sym("p", system.p.numel())
@@ -81,5 +89,5 @@ def cut_position(cut: Cut, number: int, pose: Pose) -> SX:
 
 
 def _angle(axis: SX, start: SX, end: SX) -> SX:
-    """Return the angle [rad] about `axis` from `start` to `end`, vectors (3, 1) normal to it."""
+    """Return the angle [rad] about the unit vector `axis` from `start` to `end`, normal to it."""
     return casadi.atan2(casadi.dot(cross(axis, start), end), casadi.dot(start, end))

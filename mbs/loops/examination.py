@@ -162,7 +162,11 @@ DETERMINED = ConfigurationCheck(loop_rows, require_determined)
 
 
 def configuration_health(system: System) -> Function:
-    """Return ``health(q, p) -> residual, leads, opening``; see `ConfigurationState`."""
+    """Return ``health(q, p) -> residual, leads, opening`` of `ConfigurationReport`.
+
+    Args:
+        system: mechanism with closed loops.
+    """
 
     def build() -> Function:
         q = SX.sym("q", system.nq)
@@ -184,7 +188,12 @@ def configuration_health(system: System) -> Function:
 def row_independence(system: System) -> Function:
     """Return ``independence(q, p)``: independence of the kept rows, from 0 (dependent) to 1.
 
-    It is the smallest squared sine between a row and the rows before it, with the columns of
+    Args:
+        system: mechanism with closed loops.
+
+    Returns:
+        Function of q (nq, 1) and p (np, 1). Its value is the smallest squared sine between a row
+        and the rows before it, with the columns of
     passive and active joints.
     """
 

@@ -43,9 +43,12 @@ class GuessTarget:
 
     @staticmethod
     def at(closing: Closing, start: Vector, guessed: Sequence[int]) -> GuessTarget:
-        """Return a target with positions `start` (nq,); `guessed` are indices in q.
+        """Return a target of the tree positions only; positions of cut joints do not count.
 
-        Positions of cut joints do not count.
+        Args:
+            closing: closure rows of the loops.
+            start: (nq,) target positions.
+            guessed: indices in q of the guessed positions.
         """
         return GuessTarget(closing.system, closing.p, start, None, tuple(guessed))
 
@@ -75,9 +78,10 @@ class GuessTarget:
         return GuessTarget(system, p, start, np.array(at_cut, dtype=float), guessed)
 
     def closing(self, held: set[int]) -> Closing:
-        """Return the closure rows with the positions of indices `held` locked at the target.
+        """Return the closure rows with some positions locked at the target.
 
-        Indices from nq on belong to cut joints.
+        Args:
+            held: indices of the locked positions. Indices from nq on belong to cut joints.
         """
         nq = self.system.nq
         locked = tuple(sorted(k for k in held if k < nq))
@@ -91,7 +95,11 @@ class GuessTarget:
         return own if self.cut is None else (*own, *self.system.cut_coordinates)
 
     def moves(self, q: Vector) -> Vector:
-        """Return differences of all positions at q (nq,) from the target [rad, m or 1]."""
+        """Return differences of all positions from the target [rad, m or 1].
+
+        Args:
+            q: (nq,) configuration.
+        """
         own = difference(self.system, q, self.start)
         if self.cut is None or not len(self.cut):
             return own
@@ -99,7 +107,12 @@ class GuessTarget:
         return np.concatenate([own, row_difference(cut, self._at_cut(q), self.cut)])
 
     def moves_between(self, q: Vector, other: Vector) -> Vector:
-        """Return differences of all positions of two configurations (nq,) [rad, m or 1]."""
+        """Return differences of all positions of two configurations [rad, m or 1].
+
+        Args:
+            q: (nq,) first configuration.
+            other: (nq,) second configuration.
+        """
         own = difference(self.system, q, other)
         if self.cut is None or not len(self.cut):
             return own
@@ -120,13 +133,21 @@ class GuessTarget:
         return cut_positions_and_slopes(self.system)(q, self.p)[0].ravel()
 
     def units(self, closing: Closing) -> Vector:
-        """Return divisors of position differences: 1 for angles, else the mechanism's size [m]."""
+        """Return divisors of position differences: 1 for angles, else the size of mechanism [m].
+
+        Args:
+            closing: closure rows of the loops.
+        """
         return distance_units((row.unit for row in self.rows), closing.size)
 
     def miss(self, closing: Closing, q: Vector) -> float:
-        """Return the Euclidean distance of q (nq,) from the guessed positions [rad, or sizes].
+        """Return Euclidean distance of a configuration from the guessed positions [rad, or sizes].
 
         Other positions do not count. Lengths are divided by the size of the mechanism.
+
+        Args:
+            closing: closure rows of the loops.
+            q: (nq,) configuration.
         """
         moves = self.moves(q) / self.units(closing)
         return float(np.linalg.norm(moves[list(self.guessed)]))
@@ -156,5 +177,5 @@ class GuessTarget:
 
 
 def _largest(values: Vector) -> float:
-    """Return the largest absolute value; 0 for an empty array."""
+    """Return the largest absolute element of `values`; 0 for an empty array."""
     return float(np.max(np.abs(values), initial=0.0))

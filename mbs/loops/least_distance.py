@@ -51,7 +51,12 @@ _GAIN = 1e-4
 
 
 def is_movable(closing: Closing, q: Vector) -> bool:
-    """Whether the loops allow a motion at the closed configuration q (nq,)."""
+    """Whether the loops allow a motion of the free positions at a closed configuration.
+
+    Args:
+        closing: closure rows and the locked positions.
+        q: (nq,) closed configuration.
+    """
     return len(closing.free) > 0 and _null_space(closing, q)[1].shape[1] > 0
 
 
@@ -125,7 +130,7 @@ class _Objective:
     units: Vector
 
     def value(self, q: Vector) -> float:
-        """Return the objective at q (nq,) [rad^2, or squared sizes]."""
+        """Return the objective at q (nq,) [rad^2, or squared sizes of the mechanism]."""
         moves = self.counted * self.target.moves(q) / self.units
         return float(moves @ moves) / 2
 

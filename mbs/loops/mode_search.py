@@ -147,7 +147,7 @@ def _largest_row(rows: Vector) -> float:
 
 
 def _same(mode: Mode, other: Mode) -> bool:
-    """Whether the positions of two modes are equal to 1e-9."""
+    """Whether the positions of two modes are equal to 1e-9 rad or m."""
     return bool(np.max(np.abs(np.subtract(mode.q, other.q)), initial=0.0) < _SAME)
 
 
@@ -168,14 +168,9 @@ a fold, the closing iteration returns to the mode, to 1e-6."""
 def _of_blocks(system: System, steps: Sequence[Step], start: Vector, p: Vector) -> ModeList:
     """Return all modes of loops that are solved stage by stage and block by block.
 
-    Args:
-        system: assembled mechanism.
-        steps: closed forms and numerical blocks, in their order of solution.
-        start: all positions; the independent ones are known.
-        p: (np,) parameters.
-
-    Raises:
-        LoopError: the number of modes is infinite.
+    `steps` are closed forms and numerical blocks in their order of solution, `start` all positions
+    with the independent ones known, p (np,) the parameters. Raises LoopError if the number of modes
+    is infinite.
     """
     told = list[Roots]()
     try:
@@ -444,9 +439,9 @@ def working_modes(
 
 
 def _tidy(target: Goal, q: Vector) -> Vector:
-    """Return q with angles within half a rotation of zero and positive quaternions.
+    """Return q (nq,) with angles in [-pi, pi] and quaternions with nonnegative first elements.
 
-    If that does not close the loops, as with gears, q is returned unchanged.
+    q is unchanged if the changed positions do not close the loops of `target`.
     """
     system = target.closing.system
     tidy = within_half_turn(system, q)
@@ -510,9 +505,9 @@ def closed_configurations(closing: Closing, start: Vector) -> Iterator[Vector]:
 
 
 def _tidy_start(closing: Closing, q: Vector) -> Vector:
-    """Return q with its free angles within half a rotation of zero.
+    """Return the positions q (nq,) with the free angles in [-pi, pi].
 
-    If that does not close the loops, as with gears, q is returned unchanged.
+    q is unchanged if the changed positions do not close the loops.
     """
     tidy = within_half_turn(closing.system, q)
     tidy[list(closing.locked)] = q[list(closing.locked)]

@@ -175,7 +175,7 @@ def _held(closing: Closing, target: GuessTarget, q: Vector | None) -> tuple[Clos
 
 
 def _others(closing: Closing, best: Vector, found: list[Vector]) -> tuple[Vector, ...]:
-    """Return the configurations of a list that differ from `best` and from each other.
+    """Return the configurations in `found` that differ from `best` and from each other.
 
     Quaternions do not count, since a rod that spins about its axis is no other configuration.
     """
@@ -191,7 +191,12 @@ def _others(closing: Closing, best: Vector, found: list[Vector]) -> tuple[Vector
 
 
 def closes(closing: Closing, q: Vector) -> bool:
-    """Whether a configuration closes the loops without correction."""
+    """Whether a configuration closes the loops without correction, with no axis opposed.
+
+    Args:
+        closing: closure rows and the locked positions.
+        q: (nq,) configuration.
+    """
     return closing.openness(q) <= CLOSED and closing.faces(q)
 
 

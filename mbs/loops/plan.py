@@ -97,10 +97,16 @@ class LoopBlock:
 
 
 def branches_at(system: System, stages: Sequence[Stage], q: Vector, p: Vector) -> tuple[int, ...]:
-    """Return the branch of each stage that results in the closed configuration q.
+    """Return the branch of each stage that results in a closed configuration.
 
-    The tuple is shorter than `stages` if no sequence of branches results in q. The positions of cut
-    joints are not in q. Later stages show whether these positions fit.
+    The tuple is shorter than `stages` if no sequence of branches results in it. The positions of
+    cut joints are not in q. Later stages show whether these positions fit.
+
+    Args:
+        system: mechanism with the loops.
+        stages: stages in their order of solution.
+        q: (nq,) closed configuration.
+        p: (np,) parameters.
     """
     return branches_from(system, stages, started_at(system, q), q, p)
 
@@ -255,7 +261,8 @@ def _may_close(
 ) -> bool:
     """Whether the loops close if stage `number` uses `branch` and all others the assembled branch.
 
-    It is true also if the positions have NaN.
+    `start` are all positions before the first stage, p (np,) the parameters. True also if the
+    positions have NaN.
     """
     reached = start.copy()
     for k, stage in enumerate(stages):
@@ -282,6 +289,9 @@ def _only(stage: Stage, kept: Sequence[int]) -> Stage:
 
 def plan(system: System) -> tuple[Stage, ...]:
     """Return the loops and couplings of a system in an order of solution from independent joints.
+
+    Args:
+        system: assembled mechanism.
 
     Raises:
         NoClosedForm: a loop has no closed form. The message contains its name and the reason.
@@ -337,7 +347,11 @@ class PlanWork:
     steps: list[Stage | LoopBlock] = field(default_factory=list)
 
     def take(self, stage: Stage | LoopBlock) -> None:
-        """Append a step and mark its positions as known."""
+        """Append a step and mark its positions as known.
+
+        Args:
+            stage: closed form of a loop, or numerical block.
+        """
         self.steps.append(stage)
         self.known |= set(stage.indices)
         if isinstance(stage, Stage) and len(stage.labels) == 1:
@@ -348,7 +362,11 @@ class PlanWork:
                     self.values[index] = number
 
     def ring(self, number: int) -> Ring:
-        """Return the cyclic chain of the unknown joints in the loop of cut joint `number`."""
+        """Return the cyclic chain of the unknown joints in a loop.
+
+        Args:
+            number: index of the cut joint of the loop.
+        """
         return ring_of(self.system, number, self.known, self.values)
 
 
@@ -613,7 +631,11 @@ def _gain(free: Vector, taken: tuple[int, ...], indices: tuple[int, ...]) -> int
 
 
 def regular_configuration(system: System) -> Vector:
-    """Return a closed configuration near the assembled one, without accidental alignments."""
+    """Return a closed configuration (nq,) near the assembled one, without accidental alignments.
+
+    Args:
+        system: mechanism with closed loops.
+    """
     configuration = np.array(system.configuration)
     closing = Closing(system, closure_parameters(system))
     return next(closing.nearby(configuration, _MOVE, _KNOWN_TRIES, _KNOWN_SEED), configuration)
@@ -657,7 +679,12 @@ class Posed:
     undetermined: tuple[int, ...]
 
     def started(self, T: Vector, q: Vector) -> Vector:
-        """Return all positions at the start: pose T (4, 4), undetermined joints from q (nq,)."""
+        """Return all positions at the start of the plan.
+
+        Args:
+            T: (4, 4) pose of the frame.
+            q: (nq,) configuration, of which only the undetermined joints count.
+        """
         start = np.zeros(self.size)
         start[list(self.undetermined)] = q[list(self.undetermined)]
         start[-_POSE:-4] = T[:3, 3]
@@ -754,7 +781,10 @@ def _weld(link: int, pose: Pose, goal: Pose) -> Cut:
 
 
 def _pose_locked(system: System, at: Function, p: Vector) -> tuple[int, ...]:
-    """Return indices in q of independent joints that can move while the frame is at rest."""
+    """Return indices in q of independent joints that can move while the frame is at rest.
+
+    `at` is the Function of the pose and its slope, p (np,) are the parameters.
+    """
     q = regular_configuration(system)
     rows = np.vstack([Closing(system, p).rows(q)[1], np.array(at(q, p)[1])])
     return undetermined_beside(system, null_space(rows), ())

@@ -63,7 +63,11 @@ def target_pose(system: System, T: Any) -> Array:
 
 
 def pose_numbers(T: Any) -> Array | None:
-    """Return T as a numeric array of any shape; None if T is not numeric."""
+    """Return a transform as a numeric array of any shape; None if it is not numeric.
+
+    Args:
+        T: array, nested lists, CasADi matrix or Pose.
+    """
     try:
         if isinstance(T, Pose):
             T = T.matrix
@@ -76,9 +80,15 @@ def pose_numbers(T: Any) -> Array | None:
 
 
 def rounded(T: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return (..., 4, 4) nearest rigid transforms, and whether each T is within 1e-6 of it (...).
+    """Return the nearest rigid transforms, and whether each matrix is within 1e-6 of its result.
 
     Source: Higham 2008, chapter 8, the Newton-Schulz iteration for the polar factor.
+
+    Args:
+        T: (..., 4, 4) matrices.
+
+    Returns:
+        Transforms (..., 4, 4) and mask (...).
     """
     with np.errstate(all="ignore"):
         R = T[..., :3, :3]
@@ -93,7 +103,12 @@ def rounded(T: Array) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def defect(T: Array, name: str = "T") -> str:
-    """Return the text that describes why a matrix (4, 4) is not a rigid transform."""
+    """Return text that describes why a matrix is not a rigid transform.
+
+    Args:
+        T: (4, 4) matrix.
+        name: name of the matrix in the text.
+    """
     open_places = np.argwhere(~np.isfinite(T))
     if len(open_places):
         r, c = (int(k) for k in open_places[0])
@@ -161,11 +176,19 @@ class Goal:
         return sorted({k for name in self.rows for k in ROWS[name]})
 
     def at(self, T: Vector) -> Goal:
-        """Return the same goal for another target pose (4, 4)."""
+        """Return the same goal for another target pose.
+
+        Args:
+            T: (4, 4) target pose [m].
+        """
         return replace(self, target=_elements(T))
 
     def gap(self, q: Vector) -> tuple[float, float]:
-        """Return the errors of the required rows at q (nq,): distance [m] and angle [rad]."""
+        """Return the errors of the required rows: distance [m] and angle [rad].
+
+        Args:
+            q: (nq,) positions.
+        """
         index = self.pose(q)[0] - self.target
         own = [k for k in self.elements if k < 3]
         axes = np.where(np.isin(range(12), self.elements), index, 0.0)[3:].reshape(3, 3)
@@ -173,7 +196,12 @@ class Goal:
         return float(np.linalg.norm(index[own])), 2 * float(np.arcsin(min(1.0, chord / 2)))
 
     def residual(self, q: Vector, weight: float = 1.0) -> tuple[Vector, Vector]:
-        """Return the residual (m,): weighted closure rows, then pose errors; its slope (m, nq)."""
+        """Return the residual (m,) of loops and pose, and its derivative by q (m, nq).
+
+        Args:
+            q: (nq,) positions.
+            weight: factor of the closure rows, which come first.
+        """
         r, J = self.closing.rows(q)
         pose, slope = self.pose(q)
         e = self.elements
@@ -189,22 +217,38 @@ class Goal:
         return np.concatenate([self.closing.sizes, pose])
 
     def openness(self, q: Vector) -> float:
-        """Return the largest row of the residual at q (nq,), divided by `sizes`."""
+        """Return the largest row of the residual, divided by `sizes`.
+
+        Args:
+            q: (nq,) positions.
+        """
         return float(np.max(np.abs(self.residual(q)[0]) / self.sizes, initial=0.0))
 
     def nearest(self, q: Vector) -> Closed:
-        """Return the result of Gauss-Newton from q (nq,) on the loops and the pose together."""
+        """Return the result of Gauss-Newton on the loops and the pose together.
+
+        Args:
+            q: (nq,) start.
+        """
         tolerance = TOLERANCE * self.sizes
         root = gauss_newton(self.residual, q, tolerance=tolerance, iterations=_ITERATIONS)
         return Closed(root.x, root.residual, root.converged and self.closing.faces(root.x))
 
     def approach(self, q: Vector) -> Closed:
-        """Return a configuration with closed loops as close to the pose as possible, from q."""
+        """Return a configuration with closed loops that is as close to the pose as possible.
+
+        Args:
+            q: (nq,) start of a Levenberg-Marquardt iteration.
+        """
         root = levenberg_marquardt(lambda x: self.residual(x, _CLOSURE_WEIGHT), q)
         return self.closing.nearest(root.x)
 
     def pose(self, q: Vector) -> tuple[Vector, Vector]:
-        """Return the elements of the frame's pose (12,), and their derivative by q (12, nq)."""
+        """Return the elements of the pose of the frame (12,), and their derivative by q (12, nq).
+
+        Args:
+            q: (nq,) positions.
+        """
         system = self.closing.system
         function: OnArrays = system.cached(
             ("pose and slope", self.frame), lambda: on_arrays(_pose_and_slope(system, self.frame))
@@ -221,6 +265,13 @@ def goal(
     parameters: Mapping[str, float] | None,
 ) -> Goal:
     """Return the goal for inputs of the user.
+
+    Args:
+        system: open or closed mechanism.
+        frame: name of a body, name of a frame, or index of a link.
+        T: (4, 4) target pose of the frame in the base [m].
+        rows: names of the rows of the pose that must agree; None for all.
+        parameters: values of symbols by name.
 
     Raises:
         ModelError: the frame or a row does not exist, or T is not a rigid transform.
@@ -316,7 +367,10 @@ def solve_pose(
 
 
 def _refusal(target: Goal, start: Vector, tried: Sequence[Closed]) -> str:
-    """Return the error message: either the loops remain open, or the pose is out of reach."""
+    """Return the error message for an unreachable goal: loops that stay open, or the nearest pose.
+
+    `start` is the first configuration, `tried` are the results of all starts.
+    """
     closing = target.closing
     best = sorted(tried, key=lambda found: found.residual)[:_FEWEST]
     near = [target.approach(q) for q in (*(found.q for found in best), start)]

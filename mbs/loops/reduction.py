@@ -33,7 +33,11 @@ class Reduction:
     drift: SX | None = None
 
     def velocities(self, v_a: SX) -> SX:
-        """Return the velocities (nv, 1) of the tree for independent velocities (m, 1)."""
+        """Return the velocities (nv, 1) of the tree.
+
+        Args:
+            v_a: (m, 1) independent velocities.
+        """
         v = casadi.mtimes(self.G, v_a)
         return casadi.densify(v if self.drift is None else v + self.drift)
 
@@ -42,6 +46,9 @@ def reduction_matrix(system: System) -> Function:
     """Return ``reduction_matrix(q) -> G``: map from independent to tree velocities, v = G v_a.
 
     With massless nodes that dampers hold, v = G v_a + g; the function returns G.
+
+    Args:
+        system: mechanism with closed loops.
 
     Returns:
         Function of q (nq, 1) that closes the loops; G (nv, m).
@@ -85,7 +92,13 @@ def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
 
 
 def tree_rows(system: System, passive: SX, active: SX) -> SX:
-    """Merge rows of passive and of independent velocities into (nv, m), in the order of v."""
+    """Return the rows of passive and of independent velocities merged in the order of v, (nv, m).
+
+    Args:
+        system: mechanism with closed loops.
+        passive: (r, m) rows of the passive velocities.
+        active: (nv - r, m) rows of the independent velocities.
+    """
     closure = system.closure
     assert closure is not None
     rows = zeros(system.nv, active.shape[1])

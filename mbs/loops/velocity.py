@@ -38,6 +38,9 @@ from mbs.spatial import Pose, Wrench, add_wrenches, cross, skew, transform_wrenc
 def closure_jacobian(system: System) -> Function:
     """Return ``closure_jacobian(q) -> J``: all constraint rows J (m, nv), which act on v.
 
+    Args:
+        system: mechanism with closed loops.
+
     Returns:
         Function of q (nq, 1); J (m, nv) [m/rad, 1 or 1/m].
     """
@@ -50,13 +53,23 @@ def closure_jacobian(system: System) -> Function:
 
 
 def constraint_rows(system: System, q: SX) -> SX:
-    """Return J (m, nv), all constraint rows, as expressions of the symbols q."""
+    """Return all constraint rows J (m, nv), which act on the velocities v.
+
+    Args:
+        system: mechanism with closed loops.
+        q: (nq, 1) symbols of positions.
+    """
     slips = [rows for _, rows in slip_rows(system, q)]
     return casadi.vertcat(velocity_rows(system, q, closure_rows(system, q)), *slips)
 
 
 def constraint_drift(system: System, q: SX) -> SX | None:
-    """Return the drift g (m, 1) of all rows J v + g = 0, or None if all rows are J v = 0."""
+    """Return the drift g (m, 1) of all rows J v + g = 0; None if all rows are J v = 0.
+
+    Args:
+        system: mechanism with closed loops.
+        q: (nq, 1) symbols of positions.
+    """
     drift = drift_rows(system, q)
     if drift is None:
         return None
@@ -65,7 +78,11 @@ def constraint_drift(system: System, q: SX) -> SX | None:
 
 
 def constraint_drift_at(system: System) -> Function | None:
-    """Return ``drift(q, p) -> g``, the drift of all rows; None if all rows are J v = 0."""
+    """Return ``drift(q, p) -> g``, the drift of all rows J v + g = 0; None if all are J v = 0.
+
+    Args:
+        system: mechanism with closed loops.
+    """
 
     def build() -> Function | None:
         q = SX.sym("q", system.nq)
@@ -77,13 +94,23 @@ def constraint_drift_at(system: System) -> Function | None:
 
 
 def independent_drift(system: System, q: SX) -> SX | None:
-    """Return the drift g (r, 1) of the independent rows; None if all rows are J v = 0."""
+    """Return the drift g (r, 1) of the independent rows J v + g = 0; None if all are J v = 0.
+
+    Args:
+        system: mechanism with closed loops.
+        q: (nq, 1) symbols of positions.
+    """
     drift = constraint_drift(system, q)
     return None if drift is None else drift[kept_rows(system)]
 
 
 def independent_constraint_rows(system: System, q: SX) -> SX:
-    """Return J (r, nv), the independent rows found by the analysis, at the symbols q."""
+    """Return the independent constraint rows J (r, nv), as found by the loop analysis.
+
+    Args:
+        system: mechanism with closed loops.
+        q: (nq, 1) symbols of positions.
+    """
     J = velocity_rows(system, q, independent_closure(system, q))
     assert system.closure is not None
     if not system.closure.slips:
@@ -93,7 +120,11 @@ def independent_constraint_rows(system: System, q: SX) -> SX:
 
 
 def constraint_jacobian(system: System) -> Function:
-    """Return ``constraint_jacobian(q, p) -> J``: all rows, with parameters p as an input."""
+    """Return ``constraint_jacobian(q, p) -> J``: all rows (m, nv), with p as an input.
+
+    Args:
+        system: mechanism with loops, with or without their analysis.
+    """
 
     def build() -> Function:
         q = SX.sym("q", system.nq)
@@ -104,7 +135,11 @@ def constraint_jacobian(system: System) -> Function:
 
 
 def kept_rows(system: System) -> list[int]:
-    """Return the indices of the independent rows among all rows; empty for an open chain."""
+    """Return the indices of the independent rows among all rows; empty for an open chain.
+
+    Args:
+        system: open or closed mechanism.
+    """
     if system.closure is None:
         return []
     positions = len(position_rows(system))
@@ -133,7 +168,12 @@ class DeterminingRows:
 
 
 def determining_rows(system: System, q: SX) -> DeterminingRows:
-    """Return the determining rows of a system with loops at the symbols q."""
+    """Return the constraint rows that determine the passive velocities.
+
+    Args:
+        system: mechanism with closed loops.
+        q: (nq, 1) symbols of positions.
+    """
     closure = system.closure
     assert closure is not None
     J = constraint_rows(system, q) if closure.varies else independent_constraint_rows(system, q)
@@ -144,13 +184,27 @@ def determining_rows(system: System, q: SX) -> DeterminingRows:
 
 
 def velocity_rows(system: System, q: SX, phi: SX) -> SX:
-    """Return J (m, nv), with d phi / dt = J v, for rows phi that depend on the symbols q."""
+    """Return J (m, nv) with d phi / dt = J v.
+
+    Args:
+        system: mechanism with these coordinates.
+        q: (nq, 1) symbols of positions.
+        phi: (m, 1) expressions of q.
+    """
     v = SX.sym("v", system.nv)
     return casadi.jacobian(casadi.jtimes(phi, q, position_rate(system.tree, q, v)), v)
 
 
 def acceleration_bias(system: System, q: SX, v: SX, J: SX, drift: SX | None = None) -> SX:
-    """Return psi = dJ/dt v + dg/dt (m, 1) for J and the drift g that depend on the symbols q."""
+    """Return the bias psi (m, 1) of J a + psi = 0: dJ/dt v + dg/dt.
+
+    Args:
+        system: mechanism with these coordinates.
+        q: (nq, 1) symbols of positions.
+        v: (nv, 1) velocities.
+        J: (m, nv) constraint rows, expressions of q.
+        drift: (m, 1) drift g of J v + g = 0; None for zero.
+    """
     speeds = casadi.mtimes(J, v)
     if drift is not None:
         speeds += drift
@@ -286,12 +340,20 @@ class Scales:
     length: float
 
     def columns(self, units: list[str]) -> NDArray[np.float64]:
-        """Return the factors of coordinates with these units: `length` for lengths, else 1."""
+        """Return the factors of coordinates: `length` for lengths, else 1.
+
+        Args:
+            units: units of the coordinates, such as "m" or "rad/s".
+        """
         return np.array([self.length if unit.startswith("m") else 1.0 for unit in units])
 
 
 def scales(system: System) -> Scales:
-    """Return the scales of a system. They are 1 if a parameter of the rows has no value."""
+    """Return the scales of a system. They are 1 if a parameter of the rows has no value.
+
+    Args:
+        system: mechanism with closed loops.
+    """
 
     def build() -> Scales:
         J = np.array(constraint_jacobian(system)(list(system.configuration), system.p_default))

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from mbs.arguments import names_given, values_given
 from mbs.assembly import System
+from mbs.assembly.component_instances import Quantity
 from mbs.assembly.model_function import Named, model_function, require_system
-from mbs.assembly.parts import Quantity
 from mbs.assembly.tables import ACCELERATION_UNIT, EFFORT_UNIT
 from mbs.assembly.tree import position_rate
 from mbs.errors import ModelError
@@ -261,8 +261,7 @@ def _mode_numbers(system: System, mode: Mapping[str, float]) -> tuple[float, ...
     """
     contacts = contacts_of(system)
     require_lasting_rows(system, contacts)
-    elements = (*contacts.stops, *contacts.frictions)
-    names = [element.name for element in elements if element is not None]
+    names = [element.name for _, element in contacts.elements]
     for name, value in mode.items():
         if name not in names:
             raise ModelError(
@@ -271,7 +270,10 @@ def _mode_numbers(system: System, mode: Mapping[str, float]) -> tuple[float, ...
             )
         if value not in (-1, 0, 1):
             raise ModelError(f"{system.name}: the mode of {name} is {value!r}; give -1, 0 or 1")
-    return tuple(float(mode.get(x.name, 0)) if x else 0.0 for x in elements)
+    modes = [0.0] * (2 * len(contacts))
+    for k, element in contacts.elements:
+        modes[k] = float(mode.get(element.name, 0))
+    return tuple(modes)
 
 
 def _condition_texts(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -18,8 +18,8 @@ from casadi import DM, SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
+from mbs.assembly.component_instances import ComponentInstance
 from mbs.assembly.model_function import Named, model_function
-from mbs.assembly.parts import ComponentInstance
 from mbs.assembly.tables import EFFORT_UNIT
 from mbs.assembly.tree import position_rate, quaternion_slices
 from mbs.components.custom import Friction, OneWay, Stop
@@ -162,6 +162,12 @@ class Contacts:
 
     def __len__(self) -> int:
         return len(self.names)
+
+    @property
+    def elements(self) -> tuple[tuple[int, ContactElement], ...]:
+        """Index (among the 2 k modes, or the 2 k efforts) of each stop, then of each friction."""
+        every = enumerate((*self.stops, *self.frictions))
+        return tuple((k, element) for k, element in every if element is not None)
 
     def at(self, q: SX, v: SX) -> ContactState:
         """Return the contact state at positions and velocities.

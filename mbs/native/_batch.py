@@ -37,7 +37,7 @@ _SEARCH = 1000  # maximum work of the overlap check of two arrays (`max_work` of
 
 
 class CPort(ctypes.Structure):
-    """Address and strides of an array: struct `mbs_port` of rows.h."""
+    """C structure `mbs_port` of rows.h: address and strides of an array, in doubles."""
 
     _fields_ = (
         ("at", ctypes.c_void_p),
@@ -47,7 +47,12 @@ class CPort(ctypes.Structure):
 
 @dataclass(frozen=True, slots=True)
 class ArrayPort:
-    """Name and shape of an input or output for one state; the shape has one or two lengths."""
+    """Name and shape of an input or output of a Function for one state.
+
+    Attributes:
+        name: name of the input or output.
+        shape: (n,) for a column of n elements, (rows, columns) for a matrix.
+    """
 
     name: str
     shape: tuple[int, ...]
@@ -62,16 +67,20 @@ class ArrayPort:
         return math.prod(self.shape)
 
     def is_many(self, array: Array) -> bool:
-        """Return whether a fitting array has a row for each state (else all states share it)."""
+        """Whether an array has a row for each state. Otherwise all states share it.
+
+        Args:
+            array: array of doubles whose last dimensions are the shape of this port.
+        """
         return array.ndim > len(self.shape)
 
     def taken(self, value: Any, owner: str) -> Array:
-        """Return an input as an array of doubles.
+        """Return an input value as an array of doubles, for a single state or for many.
 
         Arrays of doubles with constant strides are not copied. All other values are.
 
         Args:
-            value: any object; an array of numbers is expected, for a single state or for many.
+            value: any object; an array of numbers is expected.
             owner: name of the batch, for the error message.
 
         Raises:
@@ -79,7 +88,7 @@ class ArrayPort:
                 expected shape.
         """
         array = doubles(value)
-        fault = array if isinstance(array, str) else self._fault(array)
+        fault = array if isinstance(array, str) else self._shape_error(array)
         if isinstance(array, str) or fault:
             raise ModelError(f"{owner}: input {self.name} {fault}")
         return array if self._steps(array) else np.array(array, order="C")
@@ -101,12 +110,12 @@ class ArrayPort:
             fault = f"is {kind}; give a numpy array of float64"
         elif isinstance(array, np.ma.MaskedArray):
             fault = "has a mask, which would be passed over; give an array without"
-        elif not (fault := self._fault(array)) and self._steps(array) is None:
+        elif not (fault := self._shape_error(array)) and self._steps(array) is None:
             fault = "has elements that are not evenly spaced in memory, in steps of 8 bytes"
         if fault:
             raise ModelError(f"{owner}: out for {self.name} {fault}")
 
-    def _fault(self, array: Array) -> str:
+    def _shape_error(self, array: Array) -> str:
         """Return an error text about the shape of an array; empty if the shape fits."""
         lengths = len(self.shape)
         if array.shape[-lengths:] == self.shape and array.ndim <= lengths + 1:
@@ -133,7 +142,11 @@ class ArrayPort:
         return CPort(address, row, column, past_caches)
 
     def empty(self, states: int | None) -> Array:
-        """Return a new C-ordered array for `states` states; for a single state if None."""
+        """Return a new C-ordered array for the values of this port, aligned to a cache line.
+
+        Args:
+            states: number of states; None for an array of a single state.
+        """
         shape = self.shape if states is None else (states, *self.shape)
         count = math.prod(shape)
         memory = np.empty(count + _LINE // _DOUBLE)
@@ -141,7 +154,10 @@ class ArrayPort:
         return memory[first : first + count].reshape(shape)
 
     def _steps(self, array: Array) -> tuple[int, int] | None:
-        """Return the strides in doubles between states and between elements; None if they vary."""
+        """Return the strides in doubles between states and between elements; None if they vary.
+
+        The first is zero for an array that all states share.
+        """
         if array.flags.c_contiguous and array.flags.aligned:
             return (self.size if self.is_many(array) else 0), 1
         steps = array.strides
@@ -159,13 +175,23 @@ class ArrayPort:
 
 
 def same_place(one: Array, other: Array) -> bool:
-    """Return whether two arrays have the same address, shape and strides."""
+    """Whether two arrays have the same address, shape and strides.
+
+    Args:
+        one: first array.
+        other: second array.
+    """
     first, second = ((x.ctypes.data, x.shape, x.strides) for x in (one, other))
     return first == second
 
 
 def overlap(one: Array, other: Array) -> bool:
-    """Return whether two arrays share memory. False if the check takes too long."""
+    """Whether two arrays share memory. False if the check takes too long.
+
+    Args:
+        one: first array.
+        other: second array.
+    """
     try:
         return np.shares_memory(one, other, max_work=_SEARCH)  # type: ignore[arg-type]
     except np.exceptions.TooHardError:
@@ -173,7 +199,11 @@ def overlap(one: Array, other: Array) -> bool:
 
 
 def spread(array: Array) -> bool:
-    """Return whether no stride is zero, so that each element has its own memory."""
+    """Whether each element of an array has its own memory: no stride is zero.
+
+    Args:
+        array: any array.
+    """
     return all(step or length < 2 for length, step in zip(array.shape, array.strides, strict=True))
 
 
@@ -218,23 +248,21 @@ def joined(functions: Sequence[Function]) -> tuple[Function, list[ArrayPort], li
             outputs.append(ArrayPort(title, _shape(result.shape)))
             results.append(casadi.vec(casadi.densify(result).T))
     name = "_".join(function.name() for function in functions)
-    whole = Function(name, list(symbols.values()), results, list(ports), _labels(len(results)))
-    return _scalar(whole, len(functions)), list(ports.values()), outputs
+    labels = [f"result{k}" for k in range(len(results))]
+    whole = Function(name, list(symbols.values()), results, list(ports), labels)
+    return _scalar_function(whole, len(functions)), list(ports.values()), outputs
 
 
 def _shape(size: tuple[int, int]) -> tuple[int, ...]:
-    """Return the shape of a matrix; (n,) if it has one column."""
+    """Return the array shape of a matrix of this size; (n,) if it has one column."""
     return size[:1] if size[1] == 1 else size
 
 
-def _labels(count: int) -> list[str]:
-    return [f"result{k}" for k in range(count)]
+def _scalar_function(function: Function, parts: int) -> Function:
+    """Expand a Function joined from `parts` Functions to scalar operations (SX).
 
-
-def _scalar(function: Function, parts: int) -> Function:
-    """Expand a joined Function to scalar operations, with common subexpressions computed once.
-
-    Functions that cannot be expanded are returned unchanged.
+    Common subexpressions are computed once. Functions that cannot be expanded are returned
+    unchanged.
     """
     try:
         scalar = function.expand()
@@ -341,6 +369,7 @@ class Batch:
 
     @property
     def _name(self) -> str:
+        """Name of the joined Function, for error messages."""
         return self.function.name()
 
     def ordered(self, args: Sequence[Any], named: Mapping[str, Any]) -> list[Any]:
@@ -365,7 +394,11 @@ class Batch:
         return [values[name] for name in names]
 
     def _states(self, given: Sequence[Array]) -> int | None:
-        """Return the number of states; None if all inputs are single states."""
+        """Return the number of states; None if all inputs are single states.
+
+        `given` are the arrays of the inputs. Raises ModelError if they have different numbers of
+        states.
+        """
         rows = [
             (port.name, len(array))
             for port, array in zip(self.inputs, given, strict=True)
@@ -395,7 +428,12 @@ class Batch:
         return arrays
 
     def _require_apart(self, given: Sequence[Array], results: Sequence[Array]) -> None:
-        """Raise if an output shares memory with another array, unless it is exactly that input."""
+        """Raise ModelError if an output array shares memory with another array.
+
+        An output may be exactly the array of an input.
+
+        `given` are the arrays of the inputs, `results` those of the outputs.
+        """
         for port, result in zip(self.outputs, results, strict=True):
             others = [array for array in results if array is not result]
             inputs = [array for array in given if not same_place(array, result)]
@@ -406,6 +444,10 @@ class Batch:
                 )
 
     def _threads(self, asked: int | None, states: int) -> int:
+        """Return the number of threads: `asked` or all cores, at most one per 8192 states.
+
+        Raises ModelError if `asked` is not a positive integer or None.
+        """
         if asked is None:
             asked = cores()
         elif isinstance(asked, bool) or not hasattr(asked, "__index__") or asked < 1:
@@ -413,6 +455,10 @@ class Batch:
         return max(1, min(operator.index(asked), -(-states // _SHARE)))
 
     def _run(self, code: _Code, arrays: Sequence[Array], states: int, threads: int) -> None:
+        """Evaluate all states by machine code, in shares that several threads take in turn.
+
+        `arrays` are the inputs, then the outputs, which are overwritten.
+        """
         given = len(self.inputs)
         past = sum(array.nbytes for array in arrays[given:]) > _PAST_CACHES
         ports = enumerate(zip((*self.inputs, *self.outputs), arrays, strict=True))
@@ -436,7 +482,7 @@ class Batch:
             thread.join()
 
     def _interpret(self, given: Sequence[Array], results: Sequence[Array], states: int) -> None:
-        """Evaluate all states by the map of the CasADi Function, without machine code."""
+        """Evaluate all states by a map of the CasADi Function, and write them to `results`."""
         columns = []
         for x, port in zip(given, self.inputs, strict=True):
             every = x.reshape(-1, port.size) if x.size or port.size else np.zeros((1, 0))
@@ -474,6 +520,9 @@ def batch(functions: Function | Iterable[Function], *, checked: bool = True) -> 
     Raises:
         ModelError: an argument is no Function, or the inputs do not fit together.
         CompilerError: CC names no compiler, or the compiler rejects the code.
+
+    Returns:
+        Callable from arrays of inputs to arrays of outputs.
     """
     parts: list[Any] = [functions]
     if isinstance(functions, Iterable) and not isinstance(functions, str):
@@ -492,13 +541,17 @@ def batch(functions: Function | Iterable[Function], *, checked: bool = True) -> 
 
 
 def _valid_functions(models: Sequence[Any]) -> list[Function]:
-    """Return the distinct Functions that check whether the states of models are valid."""
+    """Return the different Functions that check whether inputs of models are valid."""
     asked = (model.valid() for model in models)
     return list({hash(valid): valid for valid in asked if valid is not None}.values())
 
 
 def _code(function: Function, finite: bool, valid: int) -> tuple[_Code | None, str]:
-    """Return the machine code, None if there is none, and the note of `Batch`."""
+    """Return the machine code of a joined Function, and the note of `Batch`.
+
+    None instead of the code if CasADi has to interpret it. `finite` and `valid` are options of
+    `batch_source`.
+    """
     if not compiler_found():
         return None, "interpreted by CasADi, for there is no C compiler"
     try:
@@ -515,7 +568,7 @@ def _code(function: Function, finite: bool, valid: int) -> tuple[_Code | None, s
 
 
 def _defaults(functions: Sequence[Function]) -> dict[str, Array]:
-    """Return the default parameter values `p` of a model; empty if they may not be omitted."""
+    """Return {"p": default parameters (np,)} of the first of the models that has them, else {}."""
     for function in functions:
         model = function if hasattr(function, "default_of_p") else None
         value = None if model is None else default_of_last(function, model)

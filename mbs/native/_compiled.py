@@ -102,7 +102,7 @@ def compiled(
 def _library(
     function: casadi.Function, derivatives: int, fast: bool, loops: LoopCode | None
 ) -> Path | None:
-    """Return the library of a Function and its derivatives; None if C cannot express it.
+    """Return the cached library of a Function and its derivatives; None if C cannot express it.
 
     Args:
         function: Function that is written as straight-line code.
@@ -128,9 +128,12 @@ def _library(
 
 
 def _looped_library(function: casadi.Function, derivatives: int, code: LoopCode) -> Path | None:
-    """Return the library of a model that loops over its links; None if the cache is unusable.
+    """Return the library of a model whose C code loops over its links.
 
     Derivatives without a loop version are straight-line code that is compiled at its first use.
+    None if the cache is not writable.
+
+    `code` generates the C code; `derivatives` is the highest order of the derivatives.
     """
     name = function.name()
     every = derivatives_of(name, derivatives) if derivatives else []
@@ -150,14 +153,19 @@ def _looped_library(function: casadi.Function, derivatives: int, code: LoopCode)
 
 
 def _digest(code: LoopCode | None) -> str:
-    """Return a hash of loop code for the cache key, such as of different versions; else ""."""
+    """Return a hash of loop code as part of the cache key; empty for straight-line code."""
     if code is None:
         return ""
     return f", {hashlib.sha256(repr(sorted(code.files.items())).encode()).hexdigest()}"
 
 
 def _built(function: casadi.Function, derivatives: int, fast: bool) -> Path | None:
-    """Return the library of a Function with all its derivatives, compiled immediately."""
+    """Return the library of a Function with all its derivatives, which are compiled immediately.
+
+    None if C cannot express them.
+
+    `derivatives` is the highest order, 0 to 2; `fast` permits changes of rounding.
+    """
     every = [function, *_all_derivatives(function, derivatives)]
     known = _products(function) if derivatives == 2 else []
     return _compiled(every, fast, {"patterns.c": patterns_source(known)} if known else {})
@@ -196,7 +204,7 @@ def exact_source(functions: Iterable[casadi.Function]) -> str:
 
     Raises:
         ModelError: the name of an input or output would end a C comment or string, or a Function
-            calls machine code.
+            calls a compiled Function of this process.
     """
     every = list(functions)
     scalar = [function for function in every if is_scalar(function)]
@@ -331,6 +339,9 @@ def generated(functions: Iterable[casadi.Function], name: str = "generated", **o
 def require_names(function: casadi.Function) -> None:
     """Raise if the name of an input or output cannot be part of C comments and strings.
 
+    Args:
+        function: Function to check, with all Functions that it calls.
+
     Raises:
         ModelError: the message gives the Function and the name.
     """
@@ -344,7 +355,9 @@ def require_names(function: casadi.Function) -> None:
 
 
 def calls_machine_code(functions: Iterable[casadi.Function]) -> bool:
-    """Return whether a Function calls an external function, which its C code cannot contain.
+    """Whether a Function calls an external function, which its C code cannot contain.
+
+    Handwritten functions of this package do not count; see `mbs.native.handwritten`.
 
     Args:
         functions: any Functions.
@@ -353,7 +366,7 @@ def calls_machine_code(functions: Iterable[casadi.Function]) -> bool:
 
 
 def _machine_code_in(function: casadi.Function) -> list[str]:
-    """Return the names of the external functions that a Function calls."""
+    """Return names of the external functions that a Function calls, without handwritten ones."""
     return [
         part.name()
         for part in function.find_functions()
@@ -425,7 +438,11 @@ def link_flags(*functions: casadi.Function) -> list[str]:
 
 
 def unwritten(source: str) -> str:
-    """Return the end of an error message if generated C has unsupported nodes; else empty."""
+    """Return the reason, as end of an error message, if CasADi could not write C code; else empty.
+
+    Args:
+        source: C text from `generated` or `exact_source`.
+    """
     if "#error" not in source:
         return ""
     reason = source[source.index("#error") + 6 :].splitlines()[0].strip()
@@ -437,6 +454,9 @@ def unwritten(source: str) -> str:
 
 def require_function(function: object) -> None:
     """Raise if an object is not a Function with equations and without free symbols.
+
+    Args:
+        function: any object.
 
     Raises:
         ModelError: the message gives the expected argument.
@@ -457,11 +477,13 @@ def require_function(function: object) -> None:
 
 
 def _check_order(derivatives: object) -> None:
+    """Raise ModelError unless the number of `derivatives` is 0, 1 or 2."""
     if derivatives not in (0, 1, 2):
         raise ModelError(f"derivatives is {quoted(derivatives)}; use 0, 1 or 2")
 
 
 def _all_derivatives(function: casadi.Function, order: int) -> list[casadi.Function]:
+    """Return the Functions of the derivatives of a Function up to this order, 0 to 2."""
     if order == 0:
         return []
     products = _products(function)
@@ -470,5 +492,5 @@ def _all_derivatives(function: casadi.Function, order: int) -> list[casadi.Funct
 
 
 def _products(function: casadi.Function) -> list[casadi.Function]:
-    """Return the directional derivatives of a Function, forward and reverse."""
+    """Return the directional derivatives of a Function, [forward(1), reverse(1)] of CasADi."""
     return [function.forward(1), function.reverse(1)]

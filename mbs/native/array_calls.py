@@ -80,22 +80,20 @@ def array_builtin(
     return builtin
 
 
-def _indices(pattern: Sparsity) -> np.ndarray[Any, np.dtype[np.int64]]:
-    """Return the indices of the stored elements of a sparse matrix in the dense matrix.
-
-    Elements are counted column by column.
-    """
-    return np.array(pattern.find(), dtype=np.int64)
-
-
 def _shape(pattern: Sparsity) -> tuple[Any, ...]:
-    """Return rows, columns, number of stored elements, and their indices (None if dense)."""
-    indices = None if pattern.is_dense() else _indices(pattern)
+    """Return rows, columns, number of stored elements, and their indices, of a sparsity pattern.
+
+    The indices are None if the matrix is dense.
+    """
+    indices = None if pattern.is_dense() else np.array(pattern.find(), dtype=np.int64)
     return (*pattern.shape, pattern.nnz(), indices)
 
 
 def _arguments_of_empty(pattern: Sparsity) -> tuple[Any, ...]:
-    """Return the arguments of numpy.empty: a vector for one column, else a matrix by columns."""
+    """Return arguments of numpy.empty for a result with a sparsity `pattern`: shape, type, order.
+
+    The shape is (n,) for one column, else (rows, columns) in Fortran order.
+    """
     rows, columns = pattern.shape
     return ((rows,) if columns == 1 else (rows, columns)), np.float64, "F"
 
@@ -138,7 +136,12 @@ def _guarded(
     valid: Function,
     code_of: Callable[[Function], Any],
 ) -> ArrayCall:
-    """Return a callable for a model with an input check; it is compiled at its first call."""
+    """Return a callable for a model with an input check.
+
+    `valid` is the Function of the check; `code_of` compiles it at the first call.
+
+    `result` is the callable object of the model, `function` its Function and `library` its library.
+    """
 
     def first(*args: Any) -> Any:
         builtin = code_of(valid)._arrays
@@ -189,7 +192,10 @@ class ArrayCalls:
         return self._slow(args, kwargs, out)
 
     def _fast(self, args: tuple[Any, ...], out: Any) -> Any:
-        """Return the result of the built-in callable; None if it does not support the arguments."""
+        """Return the result of the built-in callable; None if it does not support the arguments.
+
+        `out` is None, an array or a tuple of arrays.
+        """
         if len(args) != self._inputs:
             if self._last is None or len(args) != self._inputs - 1:
                 return None
@@ -199,7 +205,10 @@ class ArrayCalls:
         return self._arrays(*args, *(out if isinstance(out, tuple) else (out,)))
 
     def _slow(self, args: tuple[Any, ...], kwargs: dict[str, Any], out: Any) -> Any:
-        """Evaluate by CasADi: symbols, several columns, and arguments that raise an error."""
+        """Return the result for `args` and `kwargs` by CasADi; it is also written to `out`.
+
+        It serves symbols, several columns and arguments that raise errors.
+        """
         if any(_holds(x, np.ma.MaskedArray) for x in args):
             raise ModelError(
                 f"{self.name()}: an input has a mask, which would be passed over; give"  # type: ignore[attr-defined]
@@ -233,7 +242,7 @@ _OF_CASADI = (DM, SX, MX)
 
 
 def _holds(value: Any, kinds: type | tuple[type, ...]) -> bool:
-    """Return whether a value, or an item of a list, has one of these types."""
+    """Whether a value, or an item of a list of values, has one of the types `kinds`."""
     if isinstance(value, (list, tuple)):
         return any(_holds(item, kinds) for item in value)
     return isinstance(value, kinds)
@@ -243,7 +252,7 @@ _CLASSES: dict[type, type] = {}
 
 
 def _class_with_arrays(base: type) -> type:
-    """Return the subclass of `base` with this mixin; the same class at every call."""
+    """Return the subclass of `base` with the mixin `ArrayCalls`; the same class at every call."""
     body = {"__doc__": base.__doc__, "__module__": base.__module__}
     made = type(base.__name__, (ArrayCalls, base), body)
     return _CLASSES.setdefault(base, made)
@@ -267,6 +276,10 @@ def default_of_last(function: Function, model: Any) -> np.ndarray[Any, Any] | No
 
 
 def _numpy(result: Any) -> Any:
+    """Return a numeric result of CasADi as a numpy array: a vector if it has one column.
+
+    A tuple of results becomes a tuple of arrays.
+    """
     if isinstance(result, tuple):
         return tuple(map(_numpy, result))
     array = DM(result).full()
@@ -274,7 +287,10 @@ def _numpy(result: Any) -> Any:
 
 
 def _copy(function: Any, result: Any, out: Any) -> Any:
-    """Copy the result to the arrays of `out` and return `out`."""
+    """Copy a result of `function` to the arrays of `out` and return `out`.
+
+    Raises ModelError if an array does not fit.
+    """
     if isinstance(result, dict):
         result = tuple(result.values())
     results = result if isinstance(result, tuple) else (result,)

@@ -105,7 +105,8 @@ def batch_source(
 def _flag(inputs: list[tuple[str, int]], flags: list[str], outputs: list[int]) -> list[str]:
     """Return C lines that set outputs to NaN in lanes with a non-finite input or a flag 0.
 
-    x * 0 is NaN for an infinite or NaN input x. A flag is 1, 0, or NaN for a NaN input.
+    x * 0 is NaN for an infinite or NaN input x. A flag is 1, 0, or NaN for a NaN input. `inputs`
+    are C pointers with lengths, `outputs` the lengths of the outputs.
     """
     return [
         "    mbs_lanes zero = mbs_all(0.0);",

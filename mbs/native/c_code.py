@@ -111,7 +111,12 @@ def form_of(graph: Graph, number: int) -> str:
 
 
 def operand(graph: Graph, number: int) -> str:
-    """Return the C text of a node as an operand: array element, constant or variable name."""
+    """Return the C text of a node as an operand: array element, constant or variable name.
+
+    Args:
+        graph: operation graph that contains the node.
+        number: index of the node.
+    """
     node = graph.nodes[number]
     if node.op == casadi.OP_INPUT:
         return f"i{node.args[0]}[{node.args[1]}]"
@@ -119,7 +124,11 @@ def operand(graph: Graph, number: int) -> str:
 
 
 def constant(node: Node) -> str:
-    """Return the C literal of a constant. C reads exactly the same double."""
+    """Return the C literal of a constant. C reads exactly the same double.
+
+    Args:
+        node: node whose value is written.
+    """
     if math.isnan(node.value):
         return "NAN"
     if math.isinf(node.value):
@@ -190,16 +199,20 @@ def schedule(graph: Graph, phase: Sequence[int] | None = None) -> list[Step]:
     steps: list[Step] = []
     for batches in _batches(graph, pending, phase):
         angles = [angle for batch in batches for angle in batch.angles]
-        steps += _take(_ancestors(graph, angles, pending), pending)
+        steps += _pending_among(_ancestors(graph, angles, pending), pending)
         for batch in batches:
             steps.append(batch)
             for number, _ in batch.results:
                 pending[number] = False
-    return [*steps, *_take(range(len(graph.nodes)), pending)]
+    return [*steps, *_pending_among(range(len(graph.nodes)), pending)]
 
 
 def plain_order(graph: Graph) -> list[Step]:
-    """Return the computed nodes that the outputs need, in the order of the graph."""
+    """Return the computed nodes that the outputs need, in the order of the graph.
+
+    Args:
+        graph: operation graph.
+    """
     live = graph.live()
     return [k for k, node in enumerate(graph.nodes) if live[k] and node.op not in _FREE]
 
@@ -221,7 +234,16 @@ def phases(graph: Graph, late: Mapping[int, int]) -> list[int]:
 
 
 def blocks(graph: Graph, steps: Sequence[Item], size: int) -> list[list[Item]]:
-    """Split steps into blocks of about `size` operations. Short graphs are one block."""
+    """Split steps into blocks of about `size` operations. Short graphs are one block.
+
+    Args:
+        graph: operation graph.
+        steps: steps in order of execution.
+        size: number of operations of a block, which becomes a C function.
+
+    Returns:
+        Steps of each block.
+    """
     leaves = Counter(number for result in graph.results for number in result)
     ends = list(accumulate(_weight(step, leaves) for step in steps))
     total = ends[-1] if ends else 0
@@ -234,7 +256,8 @@ def blocks(graph: Graph, steps: Sequence[Item], size: int) -> list[list[Item]]:
 def _weight(step: Item, leaves: Mapping[int, int]) -> int:
     """Return the number of C lines of a step, or of lines that compile in the same time.
 
-    Outputs that a sequence computes are copied by a table and add nothing.
+    `leaves` counts the output elements of each node. Outputs that a recurring sequence computes are
+    copied by a table and add nothing.
     """
     if isinstance(step, Calls):
         return 2
@@ -243,17 +266,26 @@ def _weight(step: Item, leaves: Mapping[int, int]) -> int:
 
 
 def needs(graph: Graph, step: Item) -> tuple[int, ...]:
-    """Return the node indices of the operands of a step."""
+    """Return the node indices of the operands of a step.
+
+    Args:
+        graph: operation graph.
+        step: node index, sine and cosine batch, or calls of a recurring sequence.
+    """
     return graph.operands(step) if isinstance(step, int) else step.taken()
 
 
 def gives(step: Item) -> tuple[int, ...]:
-    """Return the node indices that a step computes."""
+    """Return the node indices that a step computes.
+
+    Args:
+        step: node index, sine and cosine batch, or calls of a recurring sequence.
+    """
     return (step,) if isinstance(step, int) else step.given()
 
 
-def _take(numbers: Iterable[int], pending: list[bool]) -> list[int]:
-    """Return the pending nodes of `numbers` and clear their pending flag."""
+def _pending_among(numbers: Iterable[int], pending: list[bool]) -> list[int]:
+    """Return the nodes of `numbers` that are pending, and clear their flags in `pending`."""
     taken = [number for number in numbers if pending[number]]
     for number in taken:
         pending[number] = False
@@ -261,7 +293,7 @@ def _take(numbers: Iterable[int], pending: list[bool]) -> list[int]:
 
 
 def _ancestors(graph: Graph, numbers: Iterable[int], pending: Sequence[bool]) -> list[int]:
-    """Return the pending nodes of `numbers` and all their pending operands, sorted."""
+    """Return the pending nodes of `numbers` and all pending nodes they depend on, sorted."""
     needed: set[int] = set()
     stack = list(numbers)
     while stack:
@@ -273,7 +305,10 @@ def _ancestors(graph: Graph, numbers: Iterable[int], pending: Sequence[bool]) ->
 
 
 def _batches(graph: Graph, alive: Sequence[bool], phase: Sequence[int]) -> list[list[SinCosGroup]]:
-    """Return the sine and cosine batches, grouped by phase and by depth of nested sines."""
+    """Return the sine and cosine batches, grouped by phase and by depth of nested sines.
+
+    `alive` masks the nodes to compute; `phase` is the phase of each node.
+    """
     depth = [0] * len(graph.nodes)
     levels: dict[tuple[int, int], dict[int, list[tuple[int, int]]]] = {}
     for number, node in enumerate(graph.nodes):
@@ -284,10 +319,15 @@ def _batches(graph: Graph, alive: Sequence[bool], phase: Sequence[int]) -> list[
             angles = levels.setdefault((phase[number], depth[number]), {})
             angles.setdefault(operands[0], []).append((number, part))
             depth[number] += 1
-    return [_split(levels[level]) for level in sorted(levels)]
+    return [_lane_batches(levels[level]) for level in sorted(levels)]
 
 
-def _split(angles: dict[int, list[tuple[int, int]]]) -> list[SinCosGroup]:
+def _lane_batches(angles: dict[int, list[tuple[int, int]]]) -> list[SinCosGroup]:
+    """Return batches of up to LANES angles.
+
+    `angles` maps the node of an angle to its results: node and 0 for the sine, LANES for the
+    cosine.
+    """
     result = []
     every = list(angles.items())
     for k in range(0, len(every), LANES):
@@ -366,7 +406,7 @@ def slots(
             elif n in home:
                 outputs.setdefault(n, []).append((k, element, n))
             elif n not in elsewhere:
-                copied.setdefault(_first(graph, n, begins or {}), []).append((k, element, n))
+                copied.setdefault(_first_block(graph, n, begins or {}), []).append((k, element, n))
 
     def place(n: int) -> int:
         if n in of:
@@ -381,7 +421,12 @@ def slots(
 
 
 def _input_places(graph: Graph, calls: Sequence[Calls]) -> tuple[dict[int, int], int]:
-    """Return the offset of each input that recurring sequences read, and the total length."""
+    """Return the offset in the work array of each input of `graph` that recurring sequences read.
+
+    The second result is the total length of these inputs.
+
+    `calls` are the calls of the sequences.
+    """
     repeats = {step.repeat for step in calls}
     taken = {n for repeat in repeats for column in repeat.taken for n in column.nodes}
     nodes = (graph.nodes[n] for n in taken)
@@ -443,8 +488,11 @@ def _places(
     return of, count
 
 
-def _first(graph: Graph, number: int, begins: Mapping[int, int]) -> int:
-    """Return the first block in which an input or constant is known."""
+def _first_block(graph: Graph, number: int, begins: Mapping[int, int]) -> int:
+    """Return the index of the first block in which the input or constant `number` is known.
+
+    `begins` is as in `slots`.
+    """
     node = graph.nodes[number]
     return begins.get(node.args[0], 0) if node.op == casadi.OP_INPUT else 0
 
@@ -474,7 +522,13 @@ class BlockCode:
     zero: ClassVar[str] = "0.0"
 
     def block(self, name: str, number: int, steps: Sequence[Item]) -> str:
-        """Return the C function of a block: load from the work array, compute, store."""
+        """Return the C function of a block: load from the work array, compute, store.
+
+        Args:
+            name: name of the C function.
+            number: index of the block.
+            steps: steps of the block.
+        """
         lines = self._body(number, steps)
         used = set(_POINTERS.findall("\n".join(lines)))
         inputs = (k for k in range(len(self.graph.inputs)) if f"i{k}" in used)
@@ -490,11 +544,14 @@ class BlockCode:
         return "\n".join([*head, *lines, "}"])
 
     def repeats(self) -> list[str]:
-        """Return the C functions of the recurring sequences, with their tables."""
+        """Return the C functions of the recurring sequences of operations, with their tables."""
         return [self._repeat(*item) for item in self.where.tables.items()]
 
     def _repeat(self, repeat: Repeat, table: CallTable) -> str:
-        """Return the C function of a recurring sequence, with its tables."""
+        """Return the C function of a recurring sequence and its tables of indices and constants.
+
+        `repeat` is the sequence, `table` the work indices that each occurrence uses.
+        """
         index, name = _index(self.where.count), self._repeat_name(repeat)
         columns = (taken.nodes for taken in repeat.constants)
         constants = (map(self.number, row) for row in zip(*columns, strict=True))
@@ -503,7 +560,7 @@ class BlockCode:
         own = Slots(table.texts, {}, {}, self.where.count, 0)
         return "\n".join(
             [
-                f"/* {count}{self._ends(repeat)}. */",
+                f"/* {count}{self._access_comment(repeat)}. */",
                 *_table(index, f"{name}_at", places),
                 *_table(self.scalar, f"{name}_of", constants),
                 f"static NOINLINE void {name}"
@@ -517,9 +574,10 @@ class BlockCode:
         )
 
     def _repeat_name(self, repeat: Repeat) -> str:
+        """Return the name of the C function of a recurring sequence."""
         return f"{self.graph.name}_repeat{list(self.where.tables).index(repeat)}"
 
-    def _ends(self, repeat: Repeat) -> str:
+    def _access_comment(self, repeat: Repeat) -> str:
         """Return comment text that names the inputs and outputs that a sequence accesses."""
         taken = {n for column in repeat.taken for n in column.nodes}
         given = {n for column in repeat.given for n in column.nodes}
@@ -532,7 +590,7 @@ class BlockCode:
         return "".join(f"; {verb} {in_c_comment(names)}" for verb, names in words.items() if names)
 
     def _calls(self, step: Calls) -> str:
-        """Return the C line that calls consecutive occurrences of a sequence, in a loop."""
+        """Return the C line of a `step` that calls consecutive occurrences of a sequence."""
         name, table = self._repeat_name(step.repeat), self.where.tables[step.repeat]
         loop = f"for (int k = {step.first}; k < {step.first + step.count}; ++k) "
         index = "k" if step.count > 1 else str(step.first)
@@ -548,7 +606,7 @@ class BlockCode:
             for k, place in self.where.inputs.items()
         ]
 
-    def _last(self) -> list[str]:
+    def _output_lines(self) -> list[str]:
         """Return C lines that store the output elements that recurring sequences computed."""
         lines: list[str] = []
         for k, leaving in groupby(self.where.last, lambda leaving: leaving[0]):
@@ -564,14 +622,24 @@ class BlockCode:
         return lines
 
     def of(self, graph: Graph, where: Slots) -> Self:
-        """Return the writer of another graph whose only input is a table of constants."""
+        """Return the writer of the graph of a recurring sequence.
+
+        Args:
+            graph: graph whose only input is a table of constants.
+            where: layout of the work array for this graph.
+        """
         return replace(self, graph=graph, where=where)
 
     def number(self, number: int) -> str:
-        """Return the C text of a constant in a table."""
+        """Return the C text of a constant in a table.
+
+        Args:
+            number: node index of the constant.
+        """
         return operand(self.graph, number)
 
     def _body(self, number: int, steps: Sequence[Item]) -> list[str]:
+        """Return the C lines of block `number`: loads, operations and stores of its steps."""
         lines = [] if number else self._inputs()
         lines += self._stores(self.where.copied.get(number, ()))
         known: set[int] = set()
@@ -586,24 +654,37 @@ class BlockCode:
             for n in gives(step):
                 lines += [f"  w[{of[n]}] = t{n};"] if n in of else []
                 lines += self._stores(self.where.outputs.get(n, ()))
-        return lines + (self._last() if number == self.where.blocks - 1 else [])
+        return lines + (self._output_lines() if number == self.where.blocks - 1 else [])
 
     def _loads(self, step: Step, known: set[int]) -> list[str]:
+        """Return C lines that load the operands of a step; nodes in `known` are loaded already."""
         of = self.where.of
         needed = [n for n in dict.fromkeys(needs(self.graph, step)) if n not in known and n in of]
         known.update(needed)
         return [f"  const {self.kind} t{n} = w[{of[n]}];" for n in needed]
 
     def input(self, number: int) -> str:
-        """Return the C declaration of the pointer to an input."""
+        """Return the C declaration of the pointer to an input.
+
+        Args:
+            number: index of the input.
+        """
         return f"const {self.scalar} *restrict i{number} = in[{number}]"
 
     def stored(self, number: int) -> str:
-        """Return the C text of a node that is stored to an output."""
+        """Return the C text of a node that is stored to an output.
+
+        Args:
+            number: index of the node.
+        """
         return operand(self.graph, number)
 
     def values(self, step: Step) -> list[str]:
-        """Return C lines that declare the results of a step."""
+        """Return C lines that declare the results of a step.
+
+        Args:
+            step: node index, or sine and cosine batch.
+        """
         if not isinstance(step, SinCosGroup):
             return [f"  const double t{step} = {expression(self.graph, step)};"]
         angles = [operand(self.graph, n) for n in step.angles]
@@ -616,7 +697,10 @@ class BlockCode:
         ]
 
     def _stores(self, leaving: Sequence[Leaving]) -> list[str]:
-        """Return C lines that store output elements. Runs of zeros are stored by memset."""
+        """Return C lines that store the elements `leaving`, as (output, element, node).
+
+        Runs of zeros are stored by memset.
+        """
         rows = [(k, element, self.stored(node)) for k, element, node in leaving]
         lines: list[str] = []
         for (k, text), elements in groupby(rows, lambda row: (row[0], row[2])):
@@ -632,19 +716,22 @@ class BlockCode:
 
 
 def _index(largest: int) -> str:
-    """Return the C type of an index table; unsigned short halves its size."""
+    """Return the C type of an index: "unsigned short" if `largest` is below 2^16, else "int"."""
     return "unsigned short" if largest < 1 << 16 else "int"
 
 
 def _table(kind: str, name: str, rows: Iterable[Iterable[str]]) -> list[str]:
-    """Return C lines that declare a table. Empty if the table has no values."""
+    """Return C lines that declare a constant array with elements of type `kind`.
+
+    `rows` are texts of the elements, one row per line. Empty if there are no elements.
+    """
     lines = [f"  {', '.join(row)}," for row in rows]
     declared = f"static const {kind} {name}[] = {{"
     return [declared, *lines, "};"] if any(line.strip(" ,") for line in lines) else []
 
 
 def _runs(indices: Sequence[int]) -> list[tuple[int, int]]:
-    """Return the first and last number of each run of consecutive numbers."""
+    """Return the first and last number of each run of consecutive numbers in `indices`."""
     runs: list[tuple[int, int]] = []
     for index in indices:
         if runs and index == runs[-1][1] + 1:
@@ -696,15 +783,19 @@ class FloatCode(BlockCode):
     zero: ClassVar[str] = "0.0f"
 
     def stored(self, number: int) -> str:
-        """See BlockCode."""
+        """Return the C text of a node that is stored to an output; see `BlockCode.stored`.
+
+        Args:
+            number: index of the node.
+        """
         return _float_operand(self.graph, number)
 
     def number(self, number: int) -> str:
-        """See BlockCode."""
+        """Return the C text of a constant in a table; see `BlockCode.number`."""
         return _float_operand(self.graph, number)
 
     def values(self, step: Step) -> list[str]:
-        """See BlockCode."""
+        """Return C lines that declare the results of a step; see `BlockCode.values`."""
         assert not isinstance(step, SinCosGroup)
         form = _LITERAL.sub(r"\g<0>f", _CALL.sub(r"\1f(", form_of(self.graph, step)))
         text = form.format(*(_float_operand(self.graph, n) for n in self.graph.operands(step)))
@@ -712,6 +803,7 @@ class FloatCode(BlockCode):
 
 
 def _float_operand(graph: Graph, number: int) -> str:
+    """Return the C text of node `number` as an operand in single precision."""
     text = operand(graph, number)
     return text if text[0] in "it" else literal(graph.nodes[number].value, "float")
 
@@ -734,21 +826,34 @@ class LaneCode(BlockCode):
     kind: ClassVar[str] = "mbs_lanes"
 
     def of(self, graph: Graph, where: Slots) -> Self:
-        """See BlockCode."""
+        """Return the writer of the graph of a recurring sequence; see `BlockCode.of`.
+
+        Args:
+            graph: graph of the sequence.
+            where: places of its nodes in the work array.
+        """
         return replace(self, graph=graph, where=where, shared=[True])
 
     def input(self, number: int) -> str:
-        """See BlockCode."""
+        """Return the C declaration of the pointer to an input; see `BlockCode.input`.
+
+        Args:
+            number: index of the input.
+        """
         if self.shared[number]:
             return f"const double *restrict i{number} = in[{number}]"
         return f"const mbs_lanes *restrict i{number} = (const mbs_lanes *)in[{number}]"
 
     def stored(self, number: int) -> str:
-        """See BlockCode."""
+        """Return the C text of a node that is stored to an output; see `BlockCode.stored`.
+
+        Args:
+            number: index of the node.
+        """
         return self._vector(number)
 
     def values(self, step: Step) -> list[str]:
-        """See BlockCode."""
+        """Return C lines that declare the results of a step; see `BlockCode.values`."""
         if isinstance(step, SinCosGroup):
             return [line for k in range(len(step.angles)) for line in self._sincos(step, k)]
         operands = self.graph.operands(step)
@@ -759,10 +864,11 @@ class LaneCode(BlockCode):
         if op in VECTORS:
             text = f"{VECTORS[op]}({', '.join(map(self._vector, operands))})"
         else:
-            text = expression(self.graph, step, self._write)
+            text = expression(self.graph, step, self._operand)
         return [f"  const mbs_lanes t{step} = {text};"]
 
     def _sincos(self, batch: SinCosGroup, lane: int) -> list[str]:
+        """Return C lines that compute sine and cosine of the angle with index `lane` of a batch."""
         angle = batch.angles[lane]
         own = [(n, place) for n, place in batch.results if place % LANES == lane]
         names = f"s{angle}", f"c{angle}"
@@ -773,15 +879,18 @@ class LaneCode(BlockCode):
         ]
 
     def _is_scalar(self, number: int) -> bool:
+        """Whether node `number` has the same value in all lanes: a constant or a shared input."""
         node = self.graph.nodes[number]
         shared = node.op == casadi.OP_INPUT and self.shared[node.args[0]]
         return shared or node.op == casadi.OP_CONST
 
     def _vector(self, number: int) -> str:
-        text = self._write(self.graph, number)
+        """Return the C text of node `number` as a SIMD vector."""
+        text = self._operand(self.graph, number)
         return f"mbs_all({text})" if self._is_scalar(number) else text
 
-    def _write(self, graph: Graph, number: int) -> str:
+    def _operand(self, graph: Graph, number: int) -> str:
+        """Return the C text of node `number` as an operand, a vector or a scalar."""
         node = graph.nodes[number]
         if node.op == casadi.OP_INPUT and not self.shared[node.args[0]]:
             return f"i{node.args[0]}[{node.args[1]} * {self.stride}]"

@@ -17,6 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Collection, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -88,6 +89,10 @@ def compiler_found() -> bool:
 
 @functools.lru_cache(maxsize=8)
 def _find(chosen: str, path: str) -> Compiler:
+    """Return the compiler `chosen` (the value of CC), or the first one in the folders of `path`.
+
+    Raises CompilerError if it does not start, or no compiler is installed.
+    """
     if chosen.strip():
         compiler = _probe(_words(chosen), path)
         if compiler is None:
@@ -109,6 +114,7 @@ def _find(chosen: str, path: str) -> Compiler:
 
 
 def _words(command: str) -> tuple[str, ...]:
+    """Return the words of a command line; a single word if its quotes are unbalanced."""
     try:
         return tuple(shlex.split(command, posix=os.name != "nt"))
     except ValueError:  # unbalanced quotes
@@ -116,6 +122,7 @@ def _words(command: str) -> tuple[str, ...]:
 
 
 def _probe(command: tuple[str, ...], path: str) -> Compiler | None:
+    """Return the compiler that `command` starts; None if its --version fails."""
     program = shutil.which(command[0], path=path)
     if program is None:
         return None
@@ -149,6 +156,9 @@ def chosen_flags(flags: Sequence[str]) -> tuple[str, ...]:
     Environment variable MBS_OPTIMIZE sets the level. Code without contraction computes the same
     values at every level. MBS_ARCHITECTURE sets the architecture, such as x86-64-v3. If it is
     unset, fast code is compiled for the processor of this computer.
+
+    Args:
+        flags: compiler flags.
 
     Raises:
         CompilerError: MBS_OPTIMIZE is no level, or MBS_ARCHITECTURE contains invalid characters.
@@ -215,6 +225,7 @@ _MAGIC = (b"\x7fELF", b"MZ", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe")
 
 
 def _is_library(file: Path) -> bool:
+    """Whether a file exists and begins like a shared library."""
     try:
         with file.open("rb") as stream:
             return stream.read(4).startswith(_MAGIC)
@@ -227,7 +238,7 @@ _LONGEST = 1800.0
 
 
 def _compile(compiler: Compiler, arguments: Sequence[str], sources: Sequence[Path]) -> None:
-    """Run the compiler.
+    """Run the compiler with some arguments; `sources` are named in error messages.
 
     Raises:
         CompilerError: it does not start or exceeds the time limit, is killed, or rejects the code.
@@ -267,12 +278,12 @@ def _compile(compiler: Compiler, arguments: Sequence[str], sources: Sequence[Pat
     if process.returncode != 0:
         if os.strerror(errno.ENOSPC) in stderr:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        complaint = _complaint(stderr)
+        complaint = _main_error(stderr)
         raise CompilerError(f"{program} refused {names}: {complaint.strip()[:500]}")
 
 
-def _complaint(stderr: str) -> str:
-    """Return the error line of compiler output; of a linker, the line with the missing symbol."""
+def _main_error(stderr: str) -> str:
+    """Return the most informative line of `stderr`, the error output of a compiler or linker."""
     lines = stderr.splitlines()
     found = (s for word in ("undefined reference", "error") for s in lines if word in s)
     return next(found, stderr)
@@ -324,7 +335,10 @@ def host_platform() -> Platform:
 
 
 def platform_named(name: object) -> Platform:
-    """Return the platform with a name.
+    """Return the platform with a name, such as "x86_64-linux".
+
+    Args:
+        name: name in FMI 3.0.
 
     Raises:
         CompilerError: no platform has this name.
@@ -338,6 +352,9 @@ def platform_named(name: object) -> Platform:
 
 def cross_compiler(goal: Platform) -> Compiler:
     """Return the compiler that builds libraries for a platform, on any computer.
+
+    Args:
+        goal: platform of the libraries.
 
     Raises:
         CompilerError: ziglang is not installed.
@@ -426,7 +443,7 @@ def known_library(files: Mapping[str, str], flags: Sequence[str] = FLAGS) -> Pat
         CompilerError: there is no compiler.
     """
     compiler, flags = find_compiler(), chosen_flags(flags)
-    return _known(cache_dir(), _key(files, flags, compiler), LIBRARY_SUFFIX)
+    return _undamaged_file(cache_dir(), _key(files, flags, compiler), LIBRARY_SUFFIX)
 
 
 _TOGETHER = "all_of_them.c"
@@ -442,29 +459,65 @@ def _library_in(
     common: Collection[str],
     together: Collection[str],
 ) -> Path:
+    """Return the library of `cached_library` in a cache folder; compile it if it is missing.
+
+    The other arguments are those of `cached_library`.
+    """
     key = _key(files, flags, compiler)
-    known = _known(folder, key, suffix)
+    known = _undamaged_file(folder, key, suffix)
     if known is not None:
         return known
     with tempfile.TemporaryDirectory(dir=folder, prefix=BUILD, ignore_cleanup_errors=True) as name:
         build = Path(name)
         for file, text in files.items():
             (build / file).write_text(text, encoding="utf-8")
-        parts = [
-            _common_object(file, files, flags, compiler, build) if file in common else build / file
-            for file in files
-            if file.endswith(".c") and file not in together
-        ]
+        parts = [file for file in files if file.endswith(".c") and file not in together]
         if together:
-            parts.append(build / _TOGETHER)
+            parts.append(_TOGETHER)
             lines = (f'#include "{file}"\n' for file in together)
-            parts[-1].write_text("".join(lines), encoding="utf-8")
+            (build / _TOGETHER).write_text("".join(lines), encoding="utf-8")
+        objects = _objects(parts, files, flags, compiler, build, common)
         output = build / f"library{suffix}"
-        library = compile_library(parts, [build], flags, output, compiler=compiler)
-        return _install(library, folder / f"{key}-{_sum_of(library)}{suffix}")
+        library = compile_library(objects, [build], flags, output, compiler=compiler)
+        return _install(library, folder / f"{key}-{_checksum(library)}{suffix}")
 
 
-def _known(folder: Path, key: str, suffix: str) -> Path | None:
+_COMPILERS = 8
+"""Largest number of compilers at the same time. Each takes about 0.1 GB. A long file is a third of
+the work for an FMU, so that more compilers would be no faster."""
+
+
+def _objects(
+    parts: Sequence[str],
+    files: Mapping[str, str],
+    flags: Sequence[str],
+    compiler: Compiler,
+    build: Path,
+    common: Collection[str],
+) -> list[Path]:
+    """Return the object files of C files in the build folder, compiled at the same time.
+
+    A single file is returned itself: it is compiled and linked in one call.
+    """
+    if len(parts) == 1 and parts[0] not in common:
+        return [build / parts[0]]
+
+    def compiled(file: str) -> Path:
+        if file in common:
+            return _common_object(file, files, flags, compiler, build)
+        return _object(build / file, _object_flags(flags), compiler)
+
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, _COMPILERS)) as workers:
+        longest_first = sorted(parts, key=lambda file: file in common)
+        found = {file: workers.submit(compiled, file) for file in longest_first}
+        try:
+            return [found[file].result() for file in parts]
+        finally:
+            workers.shutdown(cancel_futures=True)
+
+
+def _undamaged_file(folder: Path, key: str, suffix: str) -> Path | None:
+    """Return an undamaged file of a cache folder with this key and suffix, or None."""
     found = sorted(folder.glob(f"{key}-*{suffix}"))
     return next((known for known in found if is_whole(known)), None)
 
@@ -475,22 +528,39 @@ _INCLUDE = re.compile(r'^\s*#\s*include\s*"([^"]+)"', re.MULTILINE)
 def _common_object(
     file: str, files: Mapping[str, str], flags: Sequence[str], compiler: Compiler, build: Path
 ) -> Path:
-    """Return the object file of a C file; the cache key covers text, headers and flags."""
+    """Return the cached object file of a C file, compiled in the folder `build` if it is missing.
+
+    Its cache key covers text, headers and flags.
+    """
     read = [file]
     for name in read:  # the list grows: headers may include headers
         read += [n for n in _INCLUDE.findall(files[name]) if n in files and n not in read]
-    chosen = [*(flag for flag in flags if flag not in ("-shared", "-s")), "-c"]
+    chosen = _object_flags(flags)
     key, folder = _key({name: files[name] for name in read}, chosen, compiler), build.parent
-    known = _known(folder, key, ".o")
+    known = _undamaged_file(folder, key, ".o")
     if known is not None:
         return known
-    source, output = build / file, build / f"{Path(file).stem}.o"
-    _compile(compiler, [*chosen, f"-I{build}", str(source), "-o", str(output)], [source])
-    return _install(output, folder / f"{key}-{_sum_of(output)}.o")
+    output = _object(build / file, chosen, compiler)
+    return _install(output, folder / f"{key}-{_checksum(output)}.o")
+
+
+def _object_flags(flags: Sequence[str]) -> list[str]:
+    return [*(flag for flag in flags if flag not in ("-shared", "-s")), "-c"]
+
+
+def _object(source: Path, flags: Sequence[str], compiler: Compiler) -> Path:
+    """Compile a C file, with headers in its folder, to an object file beside it."""
+    output = source.with_suffix(".o")
+    _compile(compiler, [*flags, f"-I{source.parent}", str(source), "-o", str(output)], [source])
+    return output
 
 
 def is_whole(library: Path) -> bool:
-    """Return whether the content of a cached library matches the hash in its name."""
+    """Whether the content of a cached library matches the hash in its name.
+
+    Args:
+        library: path of the library.
+    """
     try:
         facts = library.stat()
         return _checked(library, facts.st_mtime_ns, facts.st_size)
@@ -500,15 +570,21 @@ def is_whole(library: Path) -> bool:
 
 @functools.lru_cache(maxsize=1024)
 def _checked(library: Path, changed: int, size: int) -> bool:
-    return library.stem.rpartition("-")[2] == _sum_of(library)
+    """Whether a cached file matches its hash; cached by time of change [ns] and size [bytes]."""
+    return library.stem.rpartition("-")[2] == _checksum(library)
 
 
-def _sum_of(library: Path) -> str:
+def _checksum(library: Path) -> str:
+    """Return the first 16 hexadecimal digits of the SHA-256 hash of the file `library`."""
     with library.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()[:16]
 
 
 def _key(files: Mapping[str, str], flags: Sequence[str], compiler: Compiler) -> str:
+    """Return the cache key of a library: a hash of `files` (name to text), `flags` and `compiler`.
+
+    It includes the versions of CasADi and of the compiler, and the type of machine.
+    """
     digest = hashlib.sha256()
     facts = (casadi.CasadiMeta.version(), platform.machine(), *compiler.command, compiler.version)
     texts = (text for name in sorted(files) for text in (name, files[name]))
@@ -519,9 +595,10 @@ def _key(files: Mapping[str, str], flags: Sequence[str], compiler: Compiler) -> 
 
 
 def _install(library: Path, target: Path) -> Path:
-    """Move a library to `target`; if another user's unreadable file is there, copy it instead.
+    """Move a built library to `target` and return the path at which it can be loaded.
 
-    The copy is in the temporary folder of this process.
+    If an unreadable file of another user is at the target, the library is copied to the temporary
+    folder of this process.
     """
     try:
         os.replace(library, target)
@@ -534,6 +611,7 @@ def _install(library: Path, target: Path) -> Path:
 
 
 def _chosen_dir() -> Path | None:
+    """Return the cache folder of MBS_CACHE_DIR or of the user; None without a home folder."""
     override = os.environ.get("MBS_CACHE_DIR")
     if override:
         return Path(override)
@@ -549,6 +627,7 @@ def _chosen_dir() -> Path | None:
 
 
 def _writable(folder: Path) -> bool:
+    """Whether files can be written to a folder, which is created if it is missing."""
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         with tempfile.TemporaryFile(dir=folder):
@@ -558,7 +637,7 @@ def _writable(folder: Path) -> bool:
 
 
 def _is_own(folder: Path) -> bool:
-    """Return whether the folder belongs to this user; if so, others lose write permission."""
+    """Whether a folder belongs to this user; write permission of other users is then removed."""
     if os.name != "posix":
         return True  # on Windows, user folders are closed to other users by default
     facts = folder.stat()
@@ -578,6 +657,7 @@ _ORPHAN = 86_400.0
 
 @functools.cache
 def _remove_orphans(folder: Path) -> None:
+    """Delete build folders in a cache folder that are older than a day; once per process."""
     for left in folder.glob(f"{BUILD}*"):
         with contextlib.suppress(OSError):
             if time.time() - left.stat().st_mtime > _ORPHAN:
@@ -586,6 +666,7 @@ def _remove_orphans(folder: Path) -> None:
 
 @functools.cache
 def _process_dir() -> Path:
+    """Return the temporary folder of this process, which is deleted at its end."""
     folder = tempfile.mkdtemp(prefix="mbs-")
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return Path(folder)

@@ -69,18 +69,23 @@ class Derivative(NamedTuple):
     pattern: bool = False
 
     def symbols(self) -> list[tuple[str, str]]:
-        """Return the names of its C functions as pairs of name and suffix."""
+        """Return the names of its C functions as pairs (name of the derivative, suffix)."""
         if self.pattern:
             return [(self.name, _PATTERN)]
         apart = self.name.startswith("jac_")
         return [(self.name, end) for end in _ENDS if not (apart and end == _PATTERN)]
 
     def of(self, function: casadi.Function) -> casadi.Function:
-        """Return this derivative of a Function."""
+        """Return this derivative of a Function.
+
+        Args:
+            function: Function that is differentiated.
+        """
         return _derivative(function, self.name)
 
 
 def _derivative(function: casadi.Function, name: str) -> casadi.Function:
+    """Return the derivative of a Function with CasADi's name, such as jac_fwd1_f."""
     if name == function.name():
         return function
     way, _, rest = name.partition("_")
@@ -100,11 +105,15 @@ def by_parameters(function: str) -> Derivative:
 
     Args:
         function: name of the Function.
+
+    Returns:
+        Derivative with the prefix `byp_`.
     """
     return Derivative(f"{_BY_PARAMETERS}_{function}")
 
 
 def _by_parameters(function: casadi.Function, name: str) -> casadi.Function:
+    """Return the derivative of the first output by the last input as a Function with this name."""
     symbols: Any = function.sx_in() if function.is_a("SXFunction") else function.mx_in()
     slope = casadi.densify(casadi.jacobian(function.call(symbols)[0], symbols[-1]))
     return casadi.Function(name, symbols, [slope], function.name_in(), ["slope"], {"cse": True})
@@ -144,6 +153,7 @@ def source(
 
 
 def _lines(every: Sequence[Derivative], own: Sequence[Derivative]) -> Iterator[str]:
+    """Yield the C lines that define the stubs of the derivatives `own` among `every`."""
     symbols = [(k, name, end) for k, part in enumerate(every) for name, end in part.symbols()]
     for index, (part, name, end) in enumerate(symbols):
         if every[part] not in own:
@@ -235,6 +245,9 @@ def promise(record: Path, content: DerivativeSource) -> None:
 @functools.lru_cache(maxsize=1)  # several derivatives of a Function are often requested in a row
 def read_record(record: Path) -> DerivativeSource:
     """Return the source of the derivatives of a Function, registered or from its file.
+
+    Args:
+        record: path of the file, or the path that was registered by `promise`.
 
     Raises:
         CompilerError: the file was deleted or is damaged.

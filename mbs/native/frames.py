@@ -146,7 +146,7 @@ def lane_loop(first: str, last: str, lines: Sequence[str]) -> list[str]:
 
 
 class WorkSize(NamedTuple):
-    """Minimum lengths of the work arrays that a C function needs."""
+    """Minimum lengths of the work arrays arg, res, iw and w in CasADi's calling convention."""
 
     arg: int = 0
     res: int = 0
@@ -154,7 +154,11 @@ class WorkSize(NamedTuple):
     w: int = 0
 
     def covering(self, other: WorkSize) -> WorkSize:
-        """Return the elementwise maximum of the lengths."""
+        """Return lengths that are enough for both: the elementwise maximum.
+
+        Args:
+            other: other lengths.
+        """
         return WorkSize(*map(max, self, other))
 
 
@@ -175,11 +179,15 @@ class Memory:
 
     @property
     def size(self) -> int:
-        """Return the total length of the work space in doubles."""
-        return self.slots + self._lost + (self._starts[-1] + LANES if self._sizes else 0)
+        """Total length of the work space in doubles."""
+        return self.slots + self._omitted_length + (self._starts[-1] + LANES if self._sizes else 0)
 
     def buffer(self, number: int) -> int:
-        """Return the index in `out` of the buffer of a graph input that a map computes."""
+        """Return the index in the C array `out` of the buffer of a graph input that a map computes.
+
+        Args:
+            number: index of the graph input.
+        """
         return len(self.graph.outputs) + number - self.function.n_in()
 
     def declarations(self) -> list[str]:
@@ -195,7 +203,7 @@ class Memory:
         taken = len(self.graph.outputs) - n_out
         inputs = [f"arg[{k}] ? arg[{k}] : zeros" for k in range(n_in)] + places[taken:]
         outputs = [f"res[{k}] ? res[{k}] : w + {self.slots}" for k in range(n_out)] + places
-        base = f"  double *const base = mbs_aligned(w + {self.slots + self._lost});"
+        base = f"  double *const base = mbs_aligned(w + {self.slots + self._omitted_length});"
         lanes = f"  mbs_lanes *const lanes = (mbs_lanes *)(base + {self._starts[-1]});"
         return [
             f"  static const double zeros[{most or 1}] = {{0}};",
@@ -205,18 +213,20 @@ class Memory:
         ]
 
     @property
-    def _lost(self) -> int:
+    def _omitted_length(self) -> int:
+        """Length of the part that receives omitted outputs, in doubles."""
         return max((self.function.nnz_out(k) for k in range(self.function.n_out())), default=0)
 
     @property
     def _sizes(self) -> list[int]:
-        """Return the lengths of the arguments of the maps, then of their results."""
+        """Lengths of the arguments of the maps, then of their results, in doubles."""
         taken = self.graph.outputs[self.function.n_out() :]
         given = self.graph.inputs[self.function.n_in() :]
         return [port.sparsity.nnz() for port in (*taken, *given)]
 
     @property
     def _starts(self) -> list[int]:
+        """First index of each buffer of the maps, rounded up to full SIMD vectors, and the end."""
         rounded = ((size + LANES - 1) // LANES * LANES for size in self._sizes)
         return list(accumulate(rounded, initial=0))
 
@@ -229,7 +239,7 @@ def function_table(function: Function, work: int | str) -> str:
 
     Args:
         function: Function to describe. The C file must define EXPORT and casadi_int.
-        work: length of the work space of the code in doubles: a number or C text.
+        work: length of the work array w of the code in doubles: a number or C text.
     """
     name, n_in, n_out = function.name(), function.n_in(), function.n_out()
     shape = "const casadi_int *"
@@ -240,29 +250,33 @@ def function_table(function: Function, work: int | str) -> str:
     lines = [
         f"EXPORT casadi_int {name}_n_in(void) {{ return {n_in}; }}",
         f"EXPORT casadi_int {name}_n_out(void) {{ return {n_out}; }}",
-        _choose("double ", f"{name}_default_in", _defaults(function)),
-        _choose("const char *", f"{name}_name_in", [f'"{s}"' for s in function.name_in()]),
-        _choose("const char *", f"{name}_name_out", [f'"{s}"' for s in function.name_out()]),
+        _switch_function("double ", f"{name}_default_in", _defaults(function)),
+        _switch_function("const char *", f"{name}_name_in", [f'"{s}"' for s in function.name_in()]),
+        _switch_function(
+            "const char *", f"{name}_name_out", [f'"{s}"' for s in function.name_out()]
+        ),
     ]
     for kind, patterns in tables.items():
         names = [f"{name}_{kind}_{k}" for k in range(len(patterns))]
         lines += [_table(*row) for row in zip(names, patterns, strict=True)]
-        lines.append(_choose(shape, f"{name}_{kind}", names))
+        lines.append(_switch_function(shape, f"{name}_{kind}", names))
     return "\n".join([*lines, _work(name, n_in, n_out, work)])
 
 
 def _defaults(function: Function) -> list[str]:
+    """Return the C text of the default value of each input; NAN if it is not finite."""
     values = [float(function.default_in(k)) for k in range(function.n_in())]
     return [repr(x) if math.isfinite(x) else "NAN" for x in values]
 
 
-def _choose(kind: str, name: str, answers: Sequence[str]) -> str:
-    """Return a C function that returns `answers[i]` for the argument i, and 0 for other values."""
+def _switch_function(kind: str, name: str, answers: Sequence[str]) -> str:
+    """Return a C function of type `kind` from i to `answers[i]`, and to 0 for other values of i."""
     cases = "".join(f" case {k}: return {answer};" for k, answer in enumerate(answers))
     return f"EXPORT {kind}{name}(casadi_int i) {{ switch (i) {{{cases} default: return 0; }} }}"
 
 
 def _table(name: str, pattern: Sparsity) -> str:
+    """Return the C array of a sparsity pattern in CasADi's compressed format."""
     dense = pattern.is_dense()
     numbers = [*pattern.shape, 1] if dense else [int(k) for k in pattern.compress()]
     values = ", ".join(map(str, numbers))
@@ -270,6 +284,10 @@ def _table(name: str, pattern: Sparsity) -> str:
 
 
 def _work(name: str, n_in: int, n_out: int, work: int | str) -> str:
+    """Return the C function NAME_work, which reports the lengths of the work arrays.
+
+    `n_in` and `n_out` are the numbers of inputs and outputs, `work` is the number of doubles.
+    """
     sizes = {"arg": n_in, "res": n_out, "iw": 0, "w": work}
     pointers = ", ".join(f"casadi_int *{kind}" for kind in sizes)
     sets = " ".join(f"if ({kind}) *{kind} = {size};" for kind, size in sizes.items())

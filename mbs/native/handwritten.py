@@ -95,12 +95,17 @@ def handwritten(
 
 
 def _renamed(function: Function, name: str) -> Function:
+    """Return a Function with the same inputs and outputs and another name."""
     symbols = [casadi.MX.sym(x, *function.size_in(x)) for x in function.name_in()]
     return Function(name, symbols, function.call(symbols), function.name_in(), function.name_out())
 
 
 def is_handwritten(function: Function) -> bool:
-    """Return whether a Function is the result of `handwritten`, or the Jacobian of a result."""
+    """Whether a Function is the result of `handwritten`, or the Jacobian of such a Function.
+
+    Args:
+        function: any Function.
+    """
     return function.is_a("External") and function.name().removeprefix("jac_") in _known
 
 
@@ -161,9 +166,9 @@ def names_declared(text: str) -> set[str]:
 
 
 def _unfolded(name: str, files: Mapping[str, str], seen: set[str]) -> str:
-    """Return a file without include guard, after the headers that it includes for the first time.
+    """Return the text of a C file with its headers inserted and without include guard.
 
-    The names of files in `seen` are skipped and the names of the inserted files are added to it.
+    Headers in `seen` are left out; the file and the inserted headers are added to `seen`.
     """
     seen.add(name)
     text = files[name]
@@ -173,6 +178,11 @@ def _unfolded(name: str, files: Mapping[str, str], seen: set[str]) -> str:
 
 
 def _without_includes(text: str, files: Mapping[str, str], seen: set[str]) -> str:
+    """Return C text in which includes of `files` are replaced by their texts, once each.
+
+    Headers in `seen` are left out; inserted headers are added to it.
+    """
+
     def put(match: re.Match[str]) -> str:
         header = match.group(1)
         return "" if header in seen else _unfolded(header, files, seen)

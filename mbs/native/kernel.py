@@ -166,7 +166,8 @@ def map_source(
 def _tables(mapped: Mapped, columns: Columns, buffers: Sequence[tuple[int, int]]) -> list[str]:
     """Return C tables with the destination of each column, for each output of a map.
 
-    `buffers` contains the index in `out` and the column length of each output.
+    `columns` are the columns that are written to an output directly. `buffers` contains the index
+    in `out` and the column length of each output of the map.
     """
     lines = []
     for k, (port, (buffer, size)) in enumerate(zip(mapped.outputs, buffers, strict=True)):
@@ -179,7 +180,10 @@ def _tables(mapped: Mapped, columns: Columns, buffers: Sequence[tuple[int, int]]
 
 
 def _inputs(graph: Graph, mapped: Mapped) -> list[str]:
-    """Return the C expression of the pointer to each input of the current columns."""
+    """Return C expressions of the pointers to the inputs of a map, at the columns that start at c.
+
+    `graph` is the graph of one column, `mapped` the map.
+    """
     result = []
     for k, port in enumerate(graph.inputs):
         text = f"out[{mapped.inputs[k]}]"
@@ -234,6 +238,7 @@ def kernel_source(functions: Iterable[Function], block: int = BLOCK) -> dict[str
 
 
 def _file(function: Function, block: int) -> str:
+    """Return text of the C file of a Function, with at most `block` assignments per C function."""
     stages = staged(function) or StagedFunction(function, ())
     graph = graph_of(stages.scalar)
     scheduling = _GCC if len(graph.nodes) <= _SHORT else ""
@@ -241,10 +246,13 @@ def _file(function: Function, block: int) -> str:
 
 
 def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: int) -> list[str]:
-    """Return the C functions of a Function: of its scalar operations and maps, and its entry."""
+    """Return the C functions of a Function: its scalar operations, its maps, and its entry.
+
+    `graph` contains the scalar operations; `block` is the maximum of assignments per C function.
+    """
     name = function.name()
     late = {port: k + 1 for k, m in enumerate(maps) for port in m.outputs}
-    pieces = _pieces(graph, late, len(maps), block)
+    pieces = _blocks_between_maps(graph, late, len(maps), block)
     begins = [0, *accumulate(map(len, pieces))]
     every = [steps for some in pieces for steps in some]
     columns, elsewhere = direct_columns(graph, maps, function.n_out())
@@ -269,8 +277,13 @@ def _function(function: Function, graph: Graph, maps: Sequence[Mapped], block: i
     ]
 
 
-def _pieces(graph: Graph, late: dict[int, int], maps: int, block: int) -> list[list[list[Item]]]:
-    """Return the blocks before the first map, between the first and the second map, and so on."""
+def _blocks_between_maps(
+    graph: Graph, late: dict[int, int], maps: int, block: int
+) -> list[list[list[Item]]]:
+    """Return the blocks before the first map, between the first and the second map, and so on.
+
+    `late` maps a graph input to the number of maps after which it is known.
+    """
     phase = phases(graph, late)
     order = schedule(graph, phase)
     every: list[list[Step]] = [[] for _ in range(maps + 1)]
@@ -315,6 +328,9 @@ class LoopCode(NamedTuple):
     def library(self, further: Mapping[str, str]) -> Path:
         """Return the library of this code and of additional C files.
 
+        Args:
+            further: file name to text of the additional files.
+
         Raises:
             CompilerError: there is no compiler, or it rejects the code.
         """
@@ -347,7 +363,10 @@ def kernel_library(
 
 @functools.cache
 def processor() -> str:
-    """Return the model and features of the processor; code is valid for an equal text only."""
+    """Return text that identifies model and features of the processor of this computer.
+
+    Fast code is valid only on processors with an equal text.
+    """
     try:
         lines = Path("/proc/cpuinfo").read_text("utf-8", "replace").splitlines()
     except OSError:
@@ -393,19 +412,22 @@ def indexed_library(key: str, make: Callable[[], Path | None]) -> Path | None:
         key: key from `index_key`.
         make: callable that writes and compiles the library. It returns None if that is
             impossible, which is not stored.
+
+    Returns:
+        path of the library; None if `make` returns None.
     """
     folder = cache_dir()
     entry = folder / f"{key}{_SUFFIX}"
-    known = _entry(entry)
+    known = _indexed_library(entry)
     if known is not None:
         return known
     library = make()
     if library is not None and library.parent == folder:
-        _write(entry, library.name)
+        _write_entry(entry, library.name)
     return library
 
 
-def _entry(entry: Path) -> Path | None:
+def _indexed_library(entry: Path) -> Path | None:
     """Return the library that an index entry names; None if a file is missing or damaged."""
     try:
         name = entry.read_text("utf-8")
@@ -415,8 +437,8 @@ def _entry(entry: Path) -> Path | None:
         return None
 
 
-def _write(entry: Path, name: str) -> None:
-    """Store the library name. If the write fails, the next call generates the C text again."""
+def _write_entry(entry: Path, name: str) -> None:
+    """Write the library name to an index entry; if that fails, the C text is generated again."""
     try:
         with tempfile.TemporaryDirectory(dir=entry.parent, prefix=BUILD) as folder:
             written = Path(folder) / entry.name
@@ -427,18 +449,19 @@ def _write(entry: Path, name: str) -> None:
 
 
 def _index_key(text: str, options: str) -> str:
+    """Return hash of compiler, flags, generator, processor, `options` and the Function `text`."""
     compiler = find_compiler()
     facts = (casadi.CasadiMeta.version(), *compiler.command, compiler.version, processor())
     digest = hashlib.sha256()
-    for part in (*facts, *chosen_flags(FAST_FLAGS), _writer(), options, text):
+    for part in (*facts, *chosen_flags(FAST_FLAGS), _generator_hash(), options, text):
         digest.update(part.encode())
         digest.update(b"\0")
     return digest.hexdigest()[:40]
 
 
 @functools.cache
-def _writer() -> str:
-    """Return a hash of the code generator: another version may generate different text."""
+def _generator_hash() -> str:
+    """Return a hash of the files of the code generator, as part of cache keys."""
     digest = hashlib.sha256()
     for package in ("mbs.native", "mbs.operations"):
         for name, data in sorted(_files(resources.files(package), package)):
@@ -447,6 +470,7 @@ def _writer() -> str:
 
 
 def _files(folder: Traversable, path: str) -> Iterator[tuple[str, bytes]]:
+    """Yield path and content of the source files in a folder and its subfolders."""
     for item in folder.iterdir():
         if item.is_dir() and item.name != "__pycache__":
             yield from _files(item, f"{path}/{item.name}")

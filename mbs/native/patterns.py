@@ -31,7 +31,7 @@ def pattern_source(jacobian: Function) -> str:
 
 
 def _blocks(function: Function) -> list[Sparsity]:
-    """Return the Jacobian blocks: all inputs of the first output, then of the second, etc."""
+    """Return the sparsity of each Jacobian block: all inputs of output 0, then of output 1, ..."""
     return [
         function.jac_sparsity(row, column)
         for row in range(function.n_out())
@@ -40,6 +40,7 @@ def _blocks(function: Function) -> list[Sparsity]:
 
 
 def _pattern(name: str, patterns: Iterable[Sparsity]) -> str:
+    """Return C arrays of the patterns, and the function jac_NAME_sparsity_out that returns them."""
     blocks = [tuple(pattern.compress()) for pattern in patterns]
     names = {block: f"{name}_pattern{k}" for k, block in enumerate(blocks)}
     arrays = [

@@ -116,12 +116,18 @@ class Calls:
         return tuple(node for k in range(self.count) for node in self.gives(self.first + k))
 
     def gives(self, occurrence: int) -> tuple[int, ...]:
-        """Return the indices of the nodes that a single occurrence computes."""
+        """Return the indices of the nodes that a single occurrence computes.
+
+        Args:
+            occurrence: index of the occurrence.
+        """
         return tuple(column.nodes[occurrence] for column in self.repeat.given)
 
 
 def with_calls(graph: Graph, steps: Sequence[S], least: int = LEAST) -> list[S | Calls]:
-    """Replace recurring sequences of steps by `Calls`; return equal steps if that saves little.
+    """Return the steps with recurring sequences replaced by `Calls`.
+
+    The steps are unchanged if that saves few lines of C.
 
     Args:
         graph: operation graph.
@@ -148,7 +154,11 @@ def with_calls(graph: Graph, steps: Sequence[S], least: int = LEAST) -> list[S |
 def _replaced(
     steps: Sequence[S], found: Iterable[tuple[Repeat, tuple[int, ...]]]
 ) -> list[S | Calls]:
-    """Replace sequences by `Calls`. Consecutive occurrences become a single step."""
+    """Return the steps with the sequences `found` replaced by `Calls`.
+
+    `found` are pairs of a sequence and the indices of the steps where it starts. Consecutive
+    occurrences become a single step.
+    """
     starts = {place: (r, k) for r, places in found for k, place in enumerate(places)}
     result: list[S | Calls] = []
     k = 0
@@ -225,14 +235,20 @@ def recurring(tokens: Sequence[Hashable]) -> list[tuple[int, tuple[int, ...]]]:
 
 
 def _lengths(places: Ints, length: int) -> list[int]:
-    """Return candidate lengths: `length`, and the distances of overlapping occurrences."""
+    """Return candidate lengths of a sequence that occurs at `places` with at most this length.
+
+    They are the length itself, and distances of overlapping occurrences.
+    """
     gaps = places[1:] - places[:-1]
     near = gaps[(gaps < length) & (gaps >= _SHORTEST)].tolist()
     return list(dict.fromkeys([length, mode(near), min(near)])) if near else [length]
 
 
 def _kept(places: Ints, length: int, used: Ints) -> tuple[int, int, list[int]]:
-    """Return the saved lines, the length, and the start indices that do not overlap."""
+    """Return the saved lines, the length, and the start indices of occurrences without overlap.
+
+    `used` counts the steps before each step that are part of chosen sequences already.
+    """
     kept: list[int] = []
     end = -1
     for place in places[used[places + length] == used[places]].tolist():
@@ -270,7 +286,10 @@ def _sorted(tokens: Sequence[Hashable]) -> tuple[Ints, Ints]:
 
 
 def _intervals(common: Sequence[int]) -> list[tuple[int, int, int]]:
-    """Return (length, first, last) of each maximal range of the suffix array with that prefix."""
+    """Return (length, first, last) of each maximal range of suffixes with a common prefix.
+
+    `common` are the common prefix lengths of neighbours in the suffix array.
+    """
     found: list[tuple[int, int, int]] = []
     open_ones: list[tuple[int, int]] = []
     for k, length in enumerate([*common, 0]):
@@ -308,7 +327,7 @@ class _Order:
             self._last[list(result)] = len(steps)
 
     def repeat(self, length: int, places: Sequence[int]) -> Repeat:
-        """Return the sequence of `length` steps that begins at each of these steps."""
+        """Return the recurring sequence of `length` steps that starts at each step of `places`."""
         begins = np.array(places)[:, None]
         every = begins + np.arange(length)  # indices of steps, one row per occurrence
         within = _Sequence(self._graph)
@@ -333,7 +352,11 @@ class _Order:
         return within.repeat(tuple(given), len(places))
 
     def bases(self, repeat: Repeat) -> int:
-        """Return the number of indices in a table row if results are stored in step order."""
+        """Return the number of indices per occurrence of a sequence, with results in step order.
+
+        Args:
+            repeat: recurring sequence.
+        """
         columns = np.array([t.nodes for t in repeat.taken]).reshape(-1, repeat.count)
         steps = self._place[columns]
         places = np.where(steps < 0, columns - len(self._place), steps)
@@ -352,11 +375,15 @@ class _Sequence:
         self._known: dict[Hashable, int] = {}
 
     def add(self, op: int, operands: Sequence[int]) -> None:
-        """Append an operation."""
+        """Append an operation with CasADi code `op`; the operands are nodes of the sequence."""
         self.steps.append(self._new(Node(op, tuple(operands))))
 
     def operand(self, nodes: tuple[int, ...]) -> int:
-        """Return the node of the sequence for one node of the whole graph per occurrence."""
+        """Return the sequence node for one node of the whole graph per occurrence.
+
+        It is a constant if all values are equal, else an element of the table of constants or a
+        value that is computed outside.
+        """
         first = self._whole.nodes[nodes[0]]
         if first.op != casadi.OP_CONST:
             return self._once(nodes, Node(casadi.OP_PARAMETER), self._taken, nodes)
@@ -368,7 +395,12 @@ class _Sequence:
         return self._once(values, element, self._constants, nodes)
 
     def repeat(self, given: tuple[OccurrenceNodes, ...], count: int) -> Repeat:
-        """Return the completed sequence."""
+        """Return the completed sequence, with its results `given` and the number of occurrences.
+
+        Args:
+            given: nodes of the results.
+            count: number of occurrences.
+        """
         constants = Port("constants", Sparsity.dense(len(self._constants)))
         graph = Graph(self._whole.name, (constants,), (), tuple(self._nodes), ())
         own = tuple(self._constants), tuple(self._taken)
@@ -377,12 +409,14 @@ class _Sequence:
     def _once(
         self, key: Hashable, node: Node, lists: list[OccurrenceNodes], nodes: tuple[int, ...]
     ) -> int:
+        """Return the node that is known by `key`; otherwise add `node` and append it to `lists`."""
         if key not in self._known:
             self._known[key] = self._new(node)
             lists.append(OccurrenceNodes(self._known[key], nodes))
         return self._known[key]
 
     def _new(self, node: Node) -> int:
+        """Append a node and return its index."""
         self._nodes.append(node)
         return len(self._nodes) - 1
 

@@ -36,10 +36,13 @@ _WRITTEN = ELEMENTWISE | {casadi.OP_INPUT, casadi.OP_OUTPUT, casadi.OP_CONST}
 
 
 def is_scalar(function: Function) -> bool:
-    """Return whether a Function consists of scalar operations that C has, without an expansion.
+    """Whether a Function consists of scalar operations that C has, without an expansion.
 
     The values of its C code are then bit-identical to the interpreted Function. An expansion may
     simplify operations, which changes the last bits.
+
+    Args:
+        function: any Function.
     """
     operations = range(function.n_instructions()) if function.is_a("SXFunction") else ()
     return bool(operations) and all(function.instruction_id(k) in _WRITTEN for k in operations)
@@ -70,14 +73,14 @@ def plain_source(
     """
     texts, most = [HEAD], WorkSize()
     for function in functions:
-        lines, work = _hosted(function, "", block, least)
+        lines, work = _null_safe_lines(function, "", block, least)
         texts += [*lines, ""]
         most = most.covering(work)
     return "\n".join(texts), most
 
 
 def external_source(functions: Iterable[Function]) -> str:
-    """Return the functions of `plain_source` with those that CasADi's `external` looks up.
+    """Return the C code of `plain_source` and the functions by which CasADi's `external` loads it.
 
     Args:
         functions: Functions of scalar operations with different names.
@@ -87,7 +90,7 @@ def external_source(functions: Iterable[Function]) -> str:
     """
     texts = [HEAD + EXPORT]
     for function in functions:
-        lines, work = _hosted(function, "EXPORT ", BLOCK, LEAST)
+        lines, work = _null_safe_lines(function, "EXPORT ", BLOCK, LEAST)
         texts += [*lines, function_table(function, work.w), ""]
     return "\n".join(texts)
 
@@ -133,15 +136,23 @@ def plain_flags(source: str) -> tuple[str, ...]:
 
 
 def _body(function: Function, real: Real, block: int, least: int) -> GraphCode:
-    """Return the C functions of a Function, in the order of its operations."""
+    """Return the C functions of a Function, in the order of its operations.
+
+    `real` is the C type of numbers; `block` and `least` are as in `plain_source`.
+    """
     graph = graph_of(function)
     pieces = blocks(graph, with_calls(graph, plain_order(graph), least), block)
     code = (BlockCode if real == "double" else FloatCode)(graph, slots(graph, pieces), "")
     return GraphCode(function.name(), code, pieces)
 
 
-def _hosted(function: Function, linkage: str, block: int, least: int) -> tuple[list[str], WorkSize]:
-    """Return the C functions of a Function whose arguments may be NULL, and the work sizes."""
+def _null_safe_lines(
+    function: Function, linkage: str, block: int, least: int
+) -> tuple[list[str], WorkSize]:
+    """Return the C lines of a Function whose arguments may be NULL, and its work sizes.
+
+    `linkage` is the text before the type; `block` and `least` are as in `plain_source`.
+    """
     body = _body(function, "double", block, least)
     memory = Memory(function, body.code.graph, body.code.where.count)
     lines = [*memory.declarations(), *body.calls()]

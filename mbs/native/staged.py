@@ -64,6 +64,9 @@ def staged(function: Function) -> StagedFunction | None:
     Returns:
         the stages; None if the Function contains no map, or an operation between the maps that
         is not scalar or not supported.
+
+    Args:
+        function: any Function.
     """
     if not any(f.class_name() in _MAPS for f in (function, *function.find_functions())):
         return None
@@ -116,28 +119,36 @@ class _Trace:
     maps: list[Mapped] = field(default_factory=list)
 
     def called(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
-        """Return the outputs of a Function for symbolic arguments."""
+        """Return the outputs of a Function for symbolic arguments; its maps are recorded.
+
+        Raises ModelError for operations that are not supported.
+
+        Args:
+            function: SX or MX Function.
+            arguments: its inputs.
+        """
         if function.class_name() in _MAPS:
             return self._map(function, arguments)
         if function.is_a("MXFunction"):
             return self._interpret(function, arguments)
         if function.is_a("SXFunction"):
-            return [SX(y) for y in function.call([_whole(x) for x in arguments])]
+            return [SX(y) for y in function.call([_as_matrix(x) for x in arguments])]
         raise ModelError(f"{function.name()} is not made of scalar operations")
 
     def _interpret(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
+        """Return the outputs of an MX Function by executing its instructions on symbols."""
         work: dict[int, _Value] = {}
         results = [[SX(0)] * function.nnz_out(k) for k in range(function.n_out())]
         for k in range(function.n_instructions()):
             op, node = function.instruction_id(k), function.instruction_MX(k)
             source, target = function.instruction_input(k), function.instruction_output(k)
             if op == casadi.OP_OUTPUT:
-                place, value = node.info(), _whole(work[source[0]])
+                place, value = node.info(), _as_matrix(work[source[0]])
                 for j in range(value.nnz()):
                     results[place["ind"]][place["offset"] + j] = SX(value.nz[j])
                 continue
             if op == casadi.OP_INPUT:
-                outputs: Sequence[_Value] = [_part(arguments, node)]
+                outputs: Sequence[_Value] = [_input_part(arguments, node)]
             else:
                 outputs = self._step(op, node, [work[n] if n >= 0 else SX(0) for n in source])
             work.update(zip(target, outputs, strict=True))
@@ -149,12 +160,17 @@ class _Trace:
         ]
 
     def _step(self, op: int, node: MX, arguments: list[_Value]) -> Sequence[_Value]:
+        """Return the results of one instruction of an MX Function, with CasADi operation `op`.
+
+        `node` is the CasADi node of the instruction, with its `arguments`. Raises ModelError for
+        operations that are not supported.
+        """
         if op == casadi.OP_CALL:
             return self.called(node.which_function(), arguments)
         if op == casadi.OP_HORZREPMAT:
-            value = _whole(arguments[0])
+            value = _as_matrix(arguments[0])
             return [_Tiled(value, node.shape[1] // value.shape[1])]
-        values = [_whole(x) for x in arguments]
+        values = [_as_matrix(x) for x in arguments]
         if op in ELEMENTWISE:
             return [SX.binary(op, *values) if len(values) == 2 else SX.unary(op, *values)]
         if op in _SPLITS:
@@ -167,6 +183,7 @@ class _Trace:
         return [SX(_MOVES[op](node, values))]
 
     def _map(self, function: Function, arguments: Sequence[_Value]) -> list[SX]:
+        """Record a map `function` of symbolic `arguments` and return its outputs as new symbols."""
         column, columns = function, 1
         while column.class_name() in _MAPS:
             facts = column.info()
@@ -177,7 +194,7 @@ class _Trace:
             if isinstance(x, _Tiled) and shared[k]:
                 self.arguments.append(_elements(casadi.project(x.value, column.sparsity_in(k))))
             else:
-                value = casadi.project(_whole(x), function.sparsity_in(k))
+                value = casadi.project(_as_matrix(x), function.sparsity_in(k))
                 self.arguments.append(_in_lanes(value, column.nnz_in(k), columns))
         results = []
         for k in range(column.n_out()):
@@ -189,27 +206,31 @@ class _Trace:
         return results
 
 
-def _whole(value: _Value) -> SX:
+def _as_matrix(value: _Value) -> SX:
+    """Return `value` as a matrix; a repeated matrix is written out."""
     return casadi.repmat(value.value, 1, value.times) if isinstance(value, _Tiled) else value
 
 
-def _part(arguments: Sequence[_Value], node: MX) -> _Value:
+def _input_part(arguments: Sequence[_Value], node: MX) -> _Value:
     """Return the argument, or the part of an argument, that an input node of MX reads."""
     place, pattern = node.info(), node.sparsity()
     argument = arguments[place["ind"]]
     if isinstance(argument, _Tiled) and argument.value.shape[0] == pattern.shape[0]:
         return argument
-    value, first = _whole(argument), place["offset"]
+    value, first = _as_matrix(argument), place["offset"]
     return SX(pattern, _elements(value)[first : first + pattern.nnz()])
 
 
 def _elements(value: SX) -> SX:
-    """Return the non-zero elements of a matrix as a vector."""
+    """Return the nonzero elements of a matrix `value` as a vector (nnz, 1), column by column."""
     return SX(value.nz[:]) if value.nnz() else SX(0, 1)
 
 
 def _in_lanes(value: SX, rows: int, columns: int) -> SX:
-    """Reorder columns into groups of LANES, row by row; zeros pad the last group."""
+    """Return the elements of columns in groups of LANES, row by row, as a vector.
+
+    `value` has `rows` nonzero elements per column; zeros pad the last group.
+    """
     elements = casadi.vertcat(_elements(value), 0)
     indices = [
         column * rows + row if column < columns else rows * columns
@@ -221,7 +242,10 @@ def _in_lanes(value: SX, rows: int, columns: int) -> SX:
 
 
 def _select(node: MX, values: list[SX]) -> SX:
-    """Return selected non-zero elements of a matrix with the sparsity of the node."""
+    """Return selected nonzero elements of `values[0]` with the sparsity of the node.
+
+    Raises ModelError if the selection leaves elements out.
+    """
     facts, pattern = node.info(), node.sparsity()
     if "nz" in facts:
         indices = list(facts["nz"])
@@ -236,6 +260,7 @@ def _select(node: MX, values: list[SX]) -> SX:
 
 
 def _range(slice_: Mapping[str, int]) -> range:
+    """Return the range of a CasADi slice, a dict with start, stop and step."""
     return range(slice_["start"], slice_["stop"], slice_["step"])
 
 

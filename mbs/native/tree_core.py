@@ -36,7 +36,12 @@ _LIST_NAMES = (
 
 
 def place_of(row: int, node: int) -> int:
-    """Return the index of an element in the table: blocks of eight nodes, row by row."""
+    """Return the index of an element in the table of numbers: blocks of eight nodes, row by row.
+
+    Args:
+        row: row of the quantity, from `ROWS`.
+        node: index of the node (velocity).
+    """
     return node // 8 * (8 * ROW_COUNT) + 8 * row + node % 8
 
 
@@ -94,7 +99,11 @@ class JacobianPattern:
 
 
 def nodes_of_positions(table: TreeTable) -> list[int]:
-    """Return the node of each element of q; the first node for a joint of several velocities."""
+    """Return the node of each element of q; the first node for a joint of several velocities.
+
+    Args:
+        table: table of the mechanism.
+    """
     nodes = [0] * table.positions
     for node, at in enumerate(table.lists["q_at"]):
         if at >= 0:
@@ -106,7 +115,12 @@ def nodes_of_positions(table: TreeTable) -> list[int]:
 
 
 def jacobian_pattern(table: TreeTable, model: str) -> JacobianPattern:
-    """Return the sparsity for model "idm" or "ddm"; dense if v is not in tree order."""
+    """Return the sparsity of the Jacobians of a model; dense if v is not in tree order.
+
+    Args:
+        table: table of the mechanism.
+        model: "idm" (inverse dynamics) or "ddm" (direct dynamics).
+    """
     n, coupled = table.size, model == "ddm"
     rows = [_rows(table, node, coupled) if table.in_order else range(n) for node in range(n)]
     by_v, by_q = (
@@ -117,7 +131,10 @@ def jacobian_pattern(table: TreeTable, model: str) -> JacobianPattern:
 
 
 def _rows(table: TreeTable, node: int, coupled: bool) -> Sequence[int]:
-    """Return the nodes whose effort (or acceleration) depends on a node, as in mbs_tree_pack."""
+    """Return the nodes whose effort (or acceleration) depends on a node, as in mbs_tree_pack.
+
+    `coupled` is as in `JacobianPattern`.
+    """
     lists = table.lists
     if coupled:
         while lists["link"][node] >= 0:
@@ -130,6 +147,7 @@ def _rows(table: TreeTable, node: int, coupled: bool) -> Sequence[int]:
 
 
 def _sparsity(size: int, columns: Sequence[Sequence[int]]) -> Sparsity:
+    """Return the pattern with `size` rows whose columns have nonzeros in the given rows."""
     ends = list(accumulate(map(len, columns), initial=0))
     if ends[-1] == size * len(columns):
         return Sparsity.dense(size, len(columns))
@@ -212,7 +230,7 @@ def tree_files(table: TreeTable, functions: Mapping[str, Function]) -> dict[str,
 def _source(table: TreeTable, functions: Mapping[str, Function], scratch: int) -> str:
     """Return the C code of the table of a mechanism and of the functions that CasADi calls.
 
-    `scratch` is the length of the work array of the numbers that depend on parameters.
+    `scratch` is the length of the work array for the numbers that depend on parameters.
     """
     dependent = table.dependent
     head = [
@@ -279,8 +297,8 @@ def _source(table: TreeTable, functions: Mapping[str, Function], scratch: int) -
 def _by_parameters(model: str, inputs: int) -> list[str]:
     """Return C code that calls the derivatives of a model by its parameters.
 
-    The derivatives are compiled at their first use. The size of their work space is not known
-    before, so the work space is allocated on the heap instead of by CasADi.
+    `inputs` is the number of inputs of the model. The derivatives are compiled at their first use.
+    The size of their work space is not known before, so it is allocated on the heap.
     """
     name = by_parameters(model).name
     return [
@@ -306,12 +324,13 @@ def _by_parameters(model: str, inputs: int) -> list[str]:
 
 
 def _parameter(function: Function) -> str:
+    """Return the C text of the pointer to parameters p of a Function, "arg[k]"; "0" without p."""
     names = function.name_in()
     return f"arg[{names.index('p')}]" if "p" in names else "0"
 
 
 def _call(name: str, table: TreeTable, function: Function) -> tuple[list[str], int]:
-    """Return the C lines that call the core, and the additional work space in doubles."""
+    """Return C lines that call the core for the function `name`, and its extra work in doubles."""
     match name:
         case "inertia":
             return ["  mbs_tree_inertia(m, arg[0], res[0], w);"], 0
@@ -324,7 +343,7 @@ def _call(name: str, table: TreeTable, function: Function) -> tuple[list[str], i
 
 
 def _jacobian(model: str, table: TreeTable, function: Function) -> tuple[list[str], int]:
-    """Return the C lines of a Jacobian, and the additional work space in doubles.
+    """Return the C lines of a Jacobian of "idm" or "ddm", and its extra work space in doubles.
 
     The core computes dense derivatives along the velocities. They are converted to derivatives by
     positions, and only structurally nonzero elements are stored. Derivatives by parameters come
@@ -366,10 +385,12 @@ def _jacobian(model: str, table: TreeTable, function: Function) -> tuple[list[st
 
 
 def _integers(name: str, values: Sequence[int]) -> str:
+    """Return the C declaration of a constant array of integers."""
     return f"static const int {name}[] = {{{_wrapped(map(str, values or [0]))}}};"
 
 
 def _number(value: float) -> str:
+    """Return the C text of a double; NAN for a number that depends on parameters."""
     if value != value:
         return "NAN"
     return "0" if value == 0 else repr(float(value))
@@ -382,6 +403,11 @@ def _wrapped(words: map[str]) -> str:
 
 
 def dependent_numbers(values: Sequence[SX], p: SX) -> Function:
-    """Return the Function ``numbers(p)`` of the table elements that depend on parameters."""
+    """Return the Function ``numbers(p)`` of the table elements that depend on parameters.
+
+    Args:
+        values: scalar expressions of the elements.
+        p: (np, 1) symbols of the parameters.
+    """
     column = casadi.densify(casadi.vertcat(*values))
     return Function("dependent_numbers", [p], [column], ["p"], ["numbers"], {"cse": True})

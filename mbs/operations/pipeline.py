@@ -385,7 +385,10 @@ def _scalars(named: Function, point: Sequence[DM], count: int) -> NDArray[np.flo
 
 
 def _values(graph: Graph, points: Sequence[Sequence[DM]]) -> NDArray[np.float64]:
-    """Return the values (nodes, points) of all nodes of a graph at all points."""
+    """Return the non-zero elements of each output of a Function at a point.
+
+    `point` has one value per input.
+    """
     size = len(graph.nodes)
     port, numbers = Port("nodes", Sparsity.dense(size, 1)), tuple(range(size))
     every = function_of(replace(graph, outputs=(port,), results=(numbers,)))

@@ -15,7 +15,7 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from mbs.assembly import System
-from mbs.assembly.parts import ComponentInstance, WireSource
+from mbs.assembly.component_instances import ComponentInstance, WireSource
 from mbs.assembly.tree import position_rate, quaternion_slices
 from mbs.components.custom import (
     Approach,

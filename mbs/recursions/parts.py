@@ -15,7 +15,7 @@ import casadi
 from casadi import DM, SX
 
 from mbs.assembly import System
-from mbs.assembly.parts import ComponentInstance, WireSource
+from mbs.assembly.component_instances import ComponentInstance, WireSource
 from mbs.assembly.tables import AttachedSensor
 from mbs.assembly.tree import Frame, position_rate
 from mbs.components.contact import Contact

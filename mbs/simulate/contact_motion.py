@@ -21,13 +21,13 @@ from mbs.models.contacts import (
     require_lasting_rows,
     require_undriven,
 )
-from mbs.models.state.signals import (
-    Prescribed,
-)
+from mbs.models.state.events import StateEvents
+from mbs.models.state.signals import Prescribed
 from mbs.recursions.parts import part_event_names
 from mbs.solvers.problem import IntegrationEvent
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 _LIMITS = {-1: "lower", 1: "upper"}
@@ -61,27 +61,44 @@ def require_contacts_possible(system: System, motions: Sequence[Prescribed]) -> 
     require_lasting_rows(system, contacts)
 
 
-def initial_modes(system: System, x0: Array, p: Array) -> Array:
+def initial_modes(system: System, events: StateEvents, t0: float, x0: Array, p: Array) -> Array:
     """Return the contact modes at the start, (2 k,).
 
     A coordinate that rests at a limit is in contact; a coordinate that moves slides.
 
     Args:
         system: system with k coordinates on which contacts act.
+        events: events of the state equation of the system.
+        t0: time at the start [s].
         x0: state at the start.
-        p: (np,) parameters.
+        p: parameters of the state equation, without modes.
 
     Raises:
         ModelError: a coordinate starts beyond a limit.
     """
-    contacts, nq = contacts_of(system), system.nq
+    contacts = contacts_of(system)
+    unknown = np.zeros(len(events.modes))
+    modes, beyond = (np.array(value)[:, 0] for value in events.first(t0, x0, [*p, *unknown]))
+    _require_within_limits(system, contacts, beyond[: 2 * len(contacts)] > 0, x0, p)
+    return modes
+
+
+def _require_within_limits(
+    system: System, contacts: Contacts, outside: Flags, x0: Array, p: Array
+) -> None:
+    """Raise if a coordinate starts beyond a limit.
+
+    outside: (2 k,) whether each coordinate is beyond its lower limit, then its upper limit.
+    """
+    if not outside.any():
+        return
+    nq, n = system.nq, system.nq + system.nv
     q, v = SX.sym("q", nq), SX.sym("v", system.nv)
-    found = [*contacts.first(q, v), *contacts.bounds, contacts.at(q, v).measure]
+    found = [*contacts.bounds, contacts.at(q, v).measure]
     start = Function("start", [q, v, system.p], found)
-    modes, outside, *limits = (
-        np.array(value)[:, 0] for value in start(x0[:nq], x0[nq : nq + system.nv], p)
-    )
-    for number in np.flatnonzero(outside > 0):
+    own = p[: len(system.parameters)]
+    limits = [np.array(value)[:, 0] for value in start(x0[:nq], x0[nq:n], own)]
+    for number in np.flatnonzero(outside):
         side, j = divmod(int(number), len(contacts))
         value, stop = limits[2][j], contacts.stops[j]
         assert stop is not None
@@ -95,7 +112,6 @@ def initial_modes(system: System, x0: Array, p: Array) -> Array:
             f" {_LIMITS[2 * side - 1]} limit {limits[side][j]:g} of its rigid stop; start inside,"
             " by q0"
         )
-    return modes
 
 
 def contact_columns(system: System) -> Iterator[tuple[int, str, str]]:
@@ -105,10 +121,9 @@ def contact_columns(system: System) -> Iterator[tuple[int, str, str]]:
         system: system with k coordinates on which contacts act.
     """
     contacts = contacts_of(system)
-    for column, element in enumerate((*contacts.stops, *contacts.frictions)):
-        if element is not None:
-            yield column, f"{element.name}.mode", "1"
-            yield 2 * len(contacts) + column, f"{element.name}.effort", element.unit
+    for column, element in contacts.elements:
+        yield column, f"{element.name}.mode", "1"
+        yield 2 * len(contacts) + column, f"{element.name}.effort", element.unit
 
 
 def efforts_with_contacts(system: System, q: Array, p: Array, tau: Array, efforts: Array) -> Array:

@@ -9,7 +9,7 @@ import casadi
 from casadi import DM, SX, Function
 
 from mbs.assembly import System
-from mbs.assembly.parts import WireSource
+from mbs.assembly.component_instances import WireSource
 from mbs.assembly.variable_names import POSITIONS, VELOCITIES
 from mbs.components.custom import Signal
 from mbs.errors import ModelError

@@ -30,6 +30,7 @@ from mbs.models.contacts import (
     KINDS,
     contacts_of,
 )
+from mbs.models.state.events import StateEvents
 from mbs.models.state.tree import FullState
 from mbs.native import compiled
 from mbs.numbers import OnArrays, on_arrays
@@ -53,6 +54,8 @@ _STOP_CLOSED = 1e-6
 _INTERPRETED = 2e6
 """Number of instructions that CasADi interprets in about 10 ms. Beyond it, `observe` is compiled,
 which takes some tenths of a second for a mechanism of ten links."""
+
+_NO_MODES = np.empty(0)
 
 StopReason = SolverError | Interrupted | None
 """Error that ends a motion early; None if the motion reaches its end."""
@@ -267,8 +270,7 @@ def _integrate(
             " no single point of a disc touches; end the run before, or keep it upright",
             time=end,
         )
-    watched = Events(*state.events) if state.events else None
-    motion = _integrate_motion(state, x0, times, watched, p, options)
+    motion = _integrate_motion(state, x0, times, p, _NO_MODES, options)
     part_events = motion.events if state.events else ()
     reached = times[: len(motion.x)]
     first = motion.first_slope
@@ -279,24 +281,27 @@ def _integrate_motion(
     state: FullState,
     x0: Array,
     times: Array,
-    events: Events | None,
     p: Array,
+    modes: Array,
     options: dict[str, Any],
 ) -> EventMotion:
-    """Integrate as far as possible. Steps end at discontinuities of the laws of components."""
+    """Integrate as far as possible. Steps end at discontinuities of the laws of components.
+
+    modes: modes of `state.events` at the first time.
+    """
     rhs, project, passage = state.rhs, state.project, state.passage
-    own, count, prepared = events, 0, state.prepared
+    events, prepared = None, state.prepared
     if state.crossings is not None:
         span = float(times[0]), float(times[-1])
-        own, wrapped = with_crossings(state, x0, span, events, p)
-        rhs, project, passage = wrapped
+        events, (rhs, project, passage) = with_crossings(state, x0, span, p, modes)
         prepared = state.prepared.setdefault("runs with crossings", {})
-        count = np.size(own.modes) - (0 if events is None else np.size(events.modes))
+    elif state.events is not None:
+        events = Events(state.events.indicators, state.events.jump, modes)
     motion = integrate_events(
         rhs,
         x0,
         times,
-        own,
+        events,
         p=p,
         project=project,
         passage=passage,
@@ -305,7 +310,7 @@ def _integrate_motion(
         stops=_time_stops(state, float(times[0]), float(times[-1]), p),
         **options,
     )
-    return without_crossings(motion, events, count) if count else motion
+    return motion if state.crossings is None else without_crossings(motion, state, len(modes))
 
 
 def _time_stops(
@@ -384,8 +389,8 @@ def _integrate_with_contacts(
     options: dict[str, Any],
 ) -> tuple[list[Segment], StopReason]:
     assert state.events is not None
-    first = initial_modes(system, x0, system_parameters(system, p)) if modes is None else modes
-    motion = _integrate_motion(state, x0, times, Events(*state.events, first), p, options)
+    first = initial_modes(system, state.events, float(times[0]), x0, p) if modes is None else modes
+    motion = _integrate_motion(state, x0, times, p, first, options)
     contact = ContactMotion(first, motion.modes, motion.events)
     reached = times[: len(motion.x)]
     return [Segment(state, reached, motion.x, contact, motion.first_slope)], motion.stop
@@ -402,7 +407,7 @@ def _integrate_to_end(
 ) -> tuple[Segment, EventMotion, float | None]:
     """Integrate one segment up to the limit; after it the state is held constant until the end."""
     n, n_p = len(x0), len(p)
-    count = state.events[0].numel_out(0) if state.events else 0
+    count = len(state.events.names) if state.events else 0
     t, x, pm, fired = (
         SX.sym(k, m) for k, m in (("t", 1), ("x", n), ("p", n_p + 1), ("f", count + 1))
     )
@@ -414,27 +419,33 @@ def _integrate_to_end(
     corrected, residual = state.project(t, x, parameters)
     kept = [casadi.if_else(ended, x, corrected), casadi.if_else(ended, 0, residual)]
     project = Function("project", [t, x, pm], kept)
-    # indicators of components, then of the limit
+    # events of components, then of the limit
     left = limit.measure(x[: system.nq], parameters[: len(system.parameters)]) - limit.level
     watched, after = left, x
-    if state.events:
-        own, jump = state.events
-        watched = casadi.vertcat(own(t, x, parameters), left)
+    if own := state.events:
+        watched = casadi.vertcat(own.indicators(t, x, parameters), left)
         jumps = casadi.mmax(fired[:count])
-        after = casadi.if_else(jumps, jump(t, x, parameters, fired[:count]), x)
-    events = Events(
-        Function("watched", [t, x, pm], [casadi.if_else(ended, 1, watched)]),
-        Function("end", [t, x, pm, fired], [after, casadi.fmax(ended, fired[count])]),
-        [0.0],
+        after = casadi.if_else(jumps, own.jump(t, x, parameters, fired[:count])[0], x)
+    events = StateEvents(
+        modes=("ended",),
+        names=(*(own.names if own else ()), "limit"),
+        first=Function("first", [t, x, pm], [SX(0), -SX.ones(count + 1)]),
+        indicators=Function("watched", [t, x, pm], [casadi.if_else(ended, 1, watched)]),
+        jump=Function("end", [t, x, pm, fired], [after, casadi.fmax(ended, fired[count])]),
     )
-    ending = replace(state, rhs=rhs, project=project, passage=None, prepared={})
-    if state.crossings is not None:
-        crossed = state.crossings(t, x, parameters)
-        ending = replace(ending, crossings=Function("crossings", [t, x, pm], [crossed]))
-    if state.approaches is not None:
-        approached = state.approaches(t, x, parameters)
-        ending = replace(ending, approaches=Function("approaches", [t, x, pm], [approached]))
-    motion = _integrate_motion(ending, x0, times, events, p, options)
+    crossings = state.crossings
+    if crossings is not None:
+        crossings = Function("crossings", [t, x, pm], crossings.call([t, x, parameters]))
+    ending = replace(
+        state,
+        rhs=rhs,
+        project=project,
+        passage=None,
+        events=events,
+        crossings=crossings,
+        prepared={},
+    )
+    motion = _integrate_motion(ending, x0, times, p, np.zeros(1), options)
     reached = times[: len(motion.x)]
     end = next((event.time for event in motion.events if count in event.fired), None)
     before = reached <= (np.inf if end is None else end)

@@ -172,8 +172,8 @@ class IntegrationCode:
     def _in_order(self) -> tuple[casadi.Function | None, ...]:
         """Return the functions in the order of `driver_model` in driver.h, None for missing ones.
 
-        They are rhs, project, jacobian, indicators, rates, jump, approaches, and rows, forces and
-        regularity of the `Passage`.
+        The order is: rhs, project, jacobian, indicators, rates, jump, approaches, and rows, forces
+        and regularity of the `Passage`.
         """
         own, through = self.equations, self.equations.passage
         last = (

@@ -23,10 +23,10 @@ from mbs.closed_forms.hexapod import (
     PlatformLegs,
     certify,
     follow,
-    kept_start,
     monodromy,
-    own_start,
+    platform_start,
     poses,
+    stored_start,
     text_of,
 )
 from mbs.errors import LoopError
@@ -132,7 +132,7 @@ def test_a_platform_that_moves_is_not_said_to_be_complete():
 
 def test_what_is_kept_are_forty_roots():
     for number in (0, 1):
-        start = kept_start(number)
+        start = stored_start(number)
         ends = certify(start.legs, start.x.copy(), np.ones(len(start.x)))
         assert len(start.x) == DEGREE == np.sum(ends.regular)
         file = resources.files("mbs.closed_forms") / "hexapod_starts" / f"{number}.json"
@@ -141,7 +141,7 @@ def test_what_is_kept_are_forty_roots():
 
 def test_what_is_kept_can_be_made_anew():
     """Monodromy from one root finds forty, and following them leads to those that are kept."""
-    made, kept = monodromy(7), kept_start(0)
+    made, kept = monodromy(7), stored_start(0)
     assert len(made.x) == DEGREE
     x, t = follow(Homotopy.between(made.legs, kept.legs), made.x)
     assert np.all(t == 1)
@@ -151,7 +151,7 @@ def test_what_is_kept_can_be_made_anew():
 
 
 def test_a_wrong_root_is_not_certified():
-    start = kept_start(0)
+    start = stored_start(0)
     x = start.x.copy()
     x[3] = x[5]
     x[7] += 0.5
@@ -163,8 +163,8 @@ def test_a_wrong_root_is_not_certified():
 def test_own_starts_are_kept():
     a, b = ends("semi-regular", np.random.default_rng(0))
     a, b = a - a.mean(axis=0), b - b.mean(axis=0)
-    own_start.cache_clear()
-    first = own_start(a.tobytes(), b.tobytes())
-    assert own_start(a.tobytes(), b.tobytes()) is first
+    platform_start.cache_clear()
+    first = platform_start(a.tobytes(), b.tobytes())
+    assert platform_start(a.tobytes(), b.tobytes()) is first
     assert isinstance(first.legs, PlatformLegs)
     assert len(first.x) == 28

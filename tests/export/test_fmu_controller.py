@@ -192,7 +192,7 @@ def test_sources_that_are_none_are_refused(tmp_path, sources) -> None:
     ):
         with pytest.raises(ExportError, match=message):
             fmu_model(arm(), FmuOptions(controller="pd", sources=given))
-    for name in ("core.c", "mbs_law_pd.c"):
+    for name in ("closure.c", "mbs_law_pd.c"):
         (tmp_path / name).write_text(LAW)
         with pytest.raises(ExportError, match=rf"{name} .*rename"):
             fmu_model(arm(), FmuOptions(controller="pd", sources=[tmp_path / name, sources[1]]))
@@ -201,7 +201,7 @@ def test_sources_that_are_none_are_refused(tmp_path, sources) -> None:
         mbs.export.fmu(arm(), tmp_path / "x.fmu", controller=law, sources=sources)
 
 
-@pytest.mark.parametrize("name", ["core_step", "stepper_table", "mbs_rhs", "fmi2DoStep"])
+@pytest.mark.parametrize("name", ["core_do_step", "stepper_table", "mbs_rhs", "fmi2DoStep"])
 def test_a_function_that_is_called_as_one_of_the_fmu_is_refused(tmp_path, sources, name) -> None:
     path = tmp_path / "law.c"
     path.write_text(LAW.replace("void pd(", f"void {name}("))

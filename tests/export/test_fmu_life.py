@@ -1,8 +1,10 @@
 """What instances of an FMU do from their start to their end, and the calls that they refuse."""
 
 import ctypes
+import re
 import struct
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +12,9 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Slave
 from fmu_instances import refused, signed
+
+TOLERANCE = 3e-9
+"""No other number of the instances is equal to it."""
 
 
 def test_saved_states_continue_bit_for_bit(fmu):
@@ -36,24 +41,31 @@ def test_saved_states_continue_bit_for_bit(fmu):
 
 
 def test_bytes_that_are_no_state_are_refused(fmu):
-    instance = fmu.open(FMU2Slave)
+    """Offsets are those of `core_memory`: run, variables, inputs, configuration, solver."""
+    instance = fmu.open(FMU2Slave, tolerance=TOLERANCE)
     fmu.step(instance, 3)
     state = instance.getFMUstate()
     blob = instance.serializeFMUstate(state)
     values = fmu.get(instance, *[v.name for v in fmu.description.modelVariables][:2])
-    at = len(blob.split(values.tobytes())[0])  # after the flags, time and tolerance come the values
-    flags, time, tolerance = at - 48, at - 24, at - 16
-    assert struct.unpack_from("=5i", blob, flags) == (16, 1, 0, 1, 0)
-    assert struct.unpack_from("=2d", blob, time)[0] == pytest.approx(0.03)
+    at = len(blob.split(values.tobytes())[0])  # the values of the variables
+    header = Path(fmu.folder, "sources", "model.h").read_text()
+    size = {name: int(n) for name, n in re.findall(r"#define (N\w) (\d+)", header)}
+    count = 2 * size["NX"] + sum(size[name] for name in ("NU", "NY", "NP", "NM", "NZ", "NK"))
+    mode, time, stale = at - 32, at - 24, at - 8
+    inputs = at + 8 * (count + 1 + size["NZ"] + 1)
+    known = inputs + 8 * (2 + 3 * size["NU"] + 1)
+    tolerance = len(blob.split(np.float64(TOLERANCE).tobytes())[0])
+    assert struct.unpack_from("=2i", blob, mode) == (16, 1)
+    assert [struct.unpack_from("=i", blob, flag)[0] for flag in (stale, inputs, known)] == [0, 0, 1]
+    assert struct.unpack_from("=d", blob, time)[0] == pytest.approx(0.03)
     parameter = at + 8 * next(
         v.valueReference for v in fmu.description.modelVariables if v.causality == "parameter"
     )
-    wrong = [(flags, "=i", x) for x in (0, 3, 4, 8, 64, -1)]
-    wrong += [(flags + 4 * k, "=i", x) for k, x in ((2, 2), (3, 2), (4, 3))]
+    wrong = [(mode, "=i", x) for x in (0, 3, 4, 8, 64, -1)]
+    wrong += [(stale, "=i", 2), (known, "=i", 2), (inputs, "=i", 3)]
     wrong += [(time, "=d", np.nan), (tolerance, "=d", np.inf), (tolerance, "=d", 0.0)]
     wrong += [(at, "=d", np.nan), (parameter, "=d", -1.0)]
-    n = fmu.description.numberOfContinuousStates  # the last are the slopes of the solver
-    wrong += [(len(blob) - 8 * (n + k) - 8, "=d", np.nan) for k in range(4)]
+    wrong += [(tolerance + 8 * (k + 1), "=d", np.nan) for k in range(6)]  # step size and times
     for place, form, value in wrong:
         torn = bytearray(blob)
         struct.pack_into(form, torn, place, value)

@@ -193,7 +193,7 @@ def test_an_fmu_refuses_what_the_description_of_a_mechanism_refuses(fmi, tmp_pat
 
 def test_mistakes_in_options_are_told_before_the_equations(tmp_path, monkeypatch) -> None:
     module = import_module("mbs.export.fmu.system_fmu")
-    monkeypatch.setattr(module, "minimal_state", lambda *_, **__: 1 / 0)
+    monkeypatch.setattr(module, "state_equations", lambda *_, **__: 1 / 0)
     for options, message in (
         ({"solver": "euler"}, "FMU arm: solver is 'euler'; use dopri5 or rodas or rk4"),
         ({"target": "bare"}, "FMU arm: solver is 'dopri5', and target='bare' takes steps"),

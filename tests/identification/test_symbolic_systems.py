@@ -126,7 +126,7 @@ def test_inputs_of_components_are_no_part_of_a_record():
 def test_the_model_of_a_motion_is_that_at_the_defaults():
     system = tree(symbol())
     model = mbs.models.inverse_dynamics(system)
-    along = ident.leading.of_motion(model)
+    along = ident.leading.motion_function(model)
     assert along.name_in() == ["q", "v", "a"]
     x = [[0.1, -0.4, 0.7], [1.0, 0.5, -0.3], [0.2, 0.4, 0.6]]
     np.testing.assert_allclose(along(*x), model(*x, [0.3]), 0, 1e-13)

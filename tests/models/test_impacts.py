@@ -23,7 +23,7 @@ def stopped_tree(seed, n=4):
     for k in range(n):
         m.add(RigidStop(f"stop{k}", joint=f"j{k}", lower=-1, upper=1, restitution=ELASTIC))
     system = m.assemble()
-    return system, full_state(system).events[1]
+    return system, full_state(system).events.jump
 
 
 def jumped(jump, q, v, fired, place, restitution=0.5):

@@ -77,7 +77,7 @@ def test_what_differs_has_a_library_of_its_own(cache, built):
 
 def test_another_writer_writes_again(cache, built, monkeypatch):
     compiled(model())
-    monkeypatch.setattr(kernel, "_writer", lambda: "another version")
+    monkeypatch.setattr(kernel, "_generator_hash", lambda: "another version")
     compiled(model())
     assert len(built) == 2
 
@@ -123,7 +123,7 @@ def test_a_library_that_another_user_keeps_to_himself_is_built_elsewhere(cache, 
     files = {"f.c": "int f(void) { return 43; }"}
     library = cached_library(files)
     module = sys.modules["mbs.native.compiler"]
-    read = module._sum_of
+    read = module._checksum
 
     def guarded(path):
         if path == library:
@@ -134,7 +134,7 @@ def test_a_library_that_another_user_keeps_to_himself_is_built_elsewhere(cache, 
         raise PermissionError(target)
 
     module._checked.cache_clear()
-    monkeypatch.setattr(module, "_sum_of", guarded)
+    monkeypatch.setattr(module, "_checksum", guarded)
     monkeypatch.setattr(module.os, "replace", held)
     assert not is_whole(library)
     own = cached_library(files)

@@ -156,7 +156,7 @@ def test_interpreted_functions_give_the_same_bits():
             state.rhs,
             [0, 3],
             times,
-            Events(*state.events, [0, 0]),
+            Events(state.events.indicators, state.events.jump, [0, 0]),
             p=[],
             project=state.project,
             compiled=compiled,

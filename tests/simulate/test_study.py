@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mbs import robots
-from mbs.simulate._sweep import study_of
+from mbs.simulate.sweep_identity import study_of
 
 
 @pytest.fixture(scope="module")

@@ -30,7 +30,11 @@ _ROWS = 8
 
 
 def eliminated(stage: PaulStage) -> Iterator[Candidate]:
-    """Yield steps of type 2 from several linear equations."""
+    """Yield steps of type 2 (X cos q + Y sin q = Z) from several linear equations.
+
+    Args:
+        stage: known quantities and equations.
+    """
     rows = [equation for equation in stage.equations if equation.linear]
     for variables in dict.fromkeys(e.variables for e in rows if len(e.variables) > 1):
         inside = sorted(
@@ -40,13 +44,13 @@ def eliminated(stage: PaulStage) -> Iterator[Candidate]:
             others = tuple(v for v in variables if v is not variable)
             if variable.prismatic or len(columns(others)) > _MOST:
                 continue
-            yield from _of(stage, inside, variable, others)
+            yield from _steps_for(stage, inside, variable, others)
 
 
-def _of(
+def _steps_for(
     stage: PaulStage, rows: list[Equation], variable: Variable, others: Variables
 ) -> Iterator[Candidate]:
-    """Yield steps for `variable` from linear equations, with the variables `others` eliminated."""
+    """Yield steps that solve `variable` from `rows`, with the variables `others` eliminated."""
     width = len(columns(others))
     for chosen in combinations(rows, width + 1):
         K = _stack(chosen, others)
@@ -63,7 +67,7 @@ def _of(
         cost = float(sum(row.cost for row in chosen))
 
         def build(chosen: tuple[Equation, ...] = chosen) -> SequenceStep:
-            return _built(stage, chosen, variable, others)
+            return _determinant_step(stage, chosen, variable, others)
 
         # rank between equations in one unknown (4, 5) and pairs of equations (6)
         order = 5.5 if variable.single else 5.7
@@ -71,18 +75,18 @@ def _of(
 
 
 def _stack(rows: tuple[Equation, ...], variables: Variables) -> Matrix:
-    """Return the coefficients of several equations as matrices (samples, rows, columns)."""
+    """Return the coefficients of variables in several equations, (samples, rows, columns)."""
     return np.stack(np.broadcast_arrays(*(row_values(row, variables) for row in rows)), axis=-2)
 
 
 def _minors(K: Matrix) -> Matrix:
-    """Return the cofactors (samples, k + 1) of a column next to K."""
+    """Return cofactors (samples, k + 1) of a further column appended to K (samples, k + 1, k)."""
     count = K.shape[-2]
     values = [(-1) ** row * np.linalg.det(np.delete(K, row, axis=-2)) for row in range(count)]
     return np.stack(values, axis=-1)
 
 
-def _built(
+def _determinant_step(
     stage: PaulStage, rows: tuple[Equation, ...], variable: Variable, others: Variables
 ) -> SequenceStep:
     """Return the step of X cos q + Y sin q = Z, whose coefficients are determinants.

@@ -12,16 +12,14 @@ import numpy as np
 from casadi import DM, SX
 from numpy.typing import NDArray
 
+from mbs.closed_forms.displacement_matrices import SIZE, motion_parts, symbolic_rho
 from mbs.closed_forms.paul.splits import (
     MOST_VARIABLES,
-    SIZE,
     KnownFrames,
     Members,
     SplitRow,
     Values,
     Variable,
-    joint_basis,
-    represented_pose,
     simple_rows,
     splits,
 )
@@ -93,7 +91,7 @@ class Equation:
         return all(sum(abs(power) for power in key) <= 1 for key in self.parts)
 
     def at(self, key: Key) -> Values:
-        """Return the values of a coefficient; zero if the equation does not have it."""
+        """Return the values (samples,) of the coefficient with this key; zero if there is none."""
         part = self.parts.get(key)
         return np.zeros(1, dtype=complex) if part is None else part.values
 
@@ -115,7 +113,7 @@ def equations(knowledge: KnownFrames, most: int = PRODUCTS) -> tuple[Equation, .
         for row, terms in simple_rows(split, prismatic, most):
             new = _equation(row, terms, prismatic, sums)
             if new is not None:
-                found.setdefault(_mark(new), []).append(new)
+                found.setdefault(_fingerprint(new), []).append(new)
     return tuple(
         equation
         for equal in found.values()
@@ -123,8 +121,11 @@ def equations(knowledge: KnownFrames, most: int = PRODUCTS) -> tuple[Equation, .
     )
 
 
-def _mark(equation: Equation) -> object:
-    """Return a hashable mark that is equal for equations that are multiples of each other."""
+def _fingerprint(equation: Equation) -> object:
+    """Return a hashable value that is equal for equations that are multiples of each other.
+
+    It consists of the rounded coefficients at all samples, scaled to unit length and one sign.
+    """
     keys = sorted(equation.parts)
     samples = max(len(part.values) for part in equation.parts.values())
     table = np.stack([np.broadcast_to(equation.parts[key].values, samples) for key in keys])
@@ -134,7 +135,11 @@ def _mark(equation: Equation) -> object:
 
 
 def _leading(table: Values) -> NDArray[np.float64]:
-    """Return a number per sample that changes sign with the column and is not small."""
+    """Return for each column of a complex `table` a real number whose sign changes with the column.
+
+    It is the first real or imaginary part of at least 0.3 of the largest, so that rounding does not
+    decide its sign.
+    """
     parts = np.concatenate([table.real, table.imag])
     largest = np.max(np.abs(parts), axis=0)
     # a value near zero must not decide; of values that are equal up to rounding, take the first
@@ -149,11 +154,16 @@ def _equation(
     prismatic: frozenset[int],
     sums: list[tuple[Members, NDArray[np.float64]]],
 ) -> Equation | None:
-    """Return the equation of some terms with its variables; None if they are too many."""
+    """Return the equation of `terms` with its variables; None if there are too many variables.
+
+    `sums` are known sums of angles, with their values at the samples, which are removed.
+    """
     reduced = dict[Members, tuple[Values, list[Source]]]()
     for term, given in terms.items():
         turns = any(k not in prismatic for k, _ in term)
-        rest, source, values = _fold(term, given * (2 if turns else 1), prismatic, sums)
+        rest, source, values = _without_known_sums(
+            term, given * (2 if turns else 1), prismatic, sums
+        )
         before = reduced.get(rest)
         if before is None:
             reduced[rest] = values, [source]
@@ -175,13 +185,16 @@ def _equation(
     return equation if len(variables) <= PRODUCTS or equation.linear else None
 
 
-def _fold(
+def _without_known_sums(
     term: Members,
     values: Values,
     prismatic: frozenset[int],
     sums: list[tuple[Members, NDArray[np.float64]]],
 ) -> tuple[Members, Source, Values]:
-    """Remove the known sums of angles from a term; return the remaining term and its values."""
+    """Remove the known sums of angles from a term; return the remaining term and its values.
+
+    `values` (samples,) are the coefficients of the term, `sums` as in `_equation`.
+    """
     rest, known = term, list[tuple[int, int]]()
     for number, (members, at) in enumerate(sums):
         powers = dict(rest)
@@ -202,7 +215,7 @@ def _fold(
 
 
 def _variables(terms: list[Members], prismatic: frozenset[int]) -> tuple[Variable, ...]:
-    """Return the variables: joints, with joints merged whose angles have a constant ratio."""
+    """Return the variables of terms; joints whose angles have a constant ratio are one variable."""
     columns = dict[int, list[int]]()
     for number, term in enumerate(terms):
         for k, power in term:
@@ -231,7 +244,7 @@ def _key(term: Members, variables: tuple[Variable, ...]) -> Key:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RingMatrices:
-    """Known transforms of a loop as (15, 15) matrices, see `represented`; from `ring_matrices`.
+    """Known transforms of a loop as (15, 15) matrices, see `symbolic_rho`; from `ring_matrices`.
 
     Attributes:
         on: matrices from joint to joint.
@@ -246,18 +259,22 @@ class RingMatrices:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Factor:
-    """Coefficients of X cos(angle) + Y sin(angle); X alone without an angle."""
+    """Coefficients of X cos(angle) + Y sin(angle), or of X alone for a term without angle."""
 
     X: SX
     Y: SX
 
 
 def ring_matrices(ring: Ring) -> RingMatrices:
-    """Return the matrices of the known transforms of a loop."""
+    """Return the matrices (15, 15) of the known transforms of a loop.
+
+    Args:
+        ring: loop chain.
+    """
     poses = [gap.pose for gap in ring.gaps]
     opposite = [gap.inverse().pose for gap in ring.gaps]
-    on = tuple(map(represented_pose, poses, opposite))
-    back = tuple(map(represented_pose, opposite, poses))
+    on = tuple(map(symbolic_rho, poses, opposite))
+    back = tuple(map(symbolic_rho, opposite, poses))
     squares = [SX(casadi.sumsqr(pose.p)) for pose in poses]
     numbers = [square for square in squares if square.is_constant() and float(square) > 0]
     # 1e-30 m if all symbolic lengths are zero, to prevent division by zero
@@ -266,13 +283,20 @@ def ring_matrices(ring: Ring) -> RingMatrices:
 
 
 def factor(knowledge: KnownFrames, matrices: RingMatrices, equation: Equation, key: Key) -> Factor:
-    """Return the coefficient of a product of the variables (key) of an equation, as expression."""
+    """Return the coefficient of a product of variables in an equation, as an expression.
+
+    Args:
+        knowledge: known joints and sums.
+        matrices: matrices of the known transforms.
+        equation: equation with numeric coefficients.
+        key: powers of the variables, for angles their multiples.
+    """
     total, part = Factor(SX(0), SX(0)), equation.parts.get(key)
     if part is None:
         return total
     sums = [value for _, value, _ in knowledge.open_sums()]
     for source in part.sources:
-        own = _own(knowledge, matrices, equation, source.term)
+        own = _single_term(knowledge, matrices, equation, source.term)
         if source.known:
             angle = sum((multiple * sums[number] for number, multiple in source.known), SX(0))
             own = _rotate(own, angle, source.conjugate)
@@ -288,10 +312,10 @@ def _rotate(own: Factor, angle: SX, conjugate: bool) -> Factor:
     return Factor(SX(X), SX(-Y if conjugate else Y))
 
 
-def _own(
+def _single_term(
     knowledge: KnownFrames, matrices: RingMatrices, equation: Equation, term: Members
 ) -> Factor:
-    """Return X and Y of one product of powers of the joints."""
+    """Return X and Y of the product of joint powers `term` in an equation."""
     joints = knowledge.ring.joints
     prismatic = {k: power for k, power in term if not joints[k].is_rotational}
     angles = [(k, sign) for k, sign in term if joints[k].is_rotational]
@@ -304,7 +328,7 @@ def _own(
             _coefficient(knowledge, matrices, equation.row, prismatic | cosines),
             _coefficient(knowledge, matrices, equation.row, prismatic | with_sine),
         )
-    return _mix(knowledge, matrices, equation.row, (prismatic, angles))
+    return _combined_term(knowledge, matrices, equation.row, (prismatic, angles))
 
 
 def _has_partner(
@@ -313,7 +337,10 @@ def _has_partner(
     angles: list[tuple[int, int]],
     term: Members,
 ) -> bool:
-    """Whether the equation has a term of the same joints with other signs."""
+    """Whether the equation contains another term of the same joints with other signs of angles.
+
+    `prismatic` maps joints to powers, `angles` are pairs of joint and sign, both of `term`.
+    """
     pattern = {k for k, _ in angles} | set(prismatic)
     return any(
         other != term
@@ -323,13 +350,18 @@ def _has_partner(
     )
 
 
-def _mix(
+def _combined_term(
     knowledge: KnownFrames,
     matrices: RingMatrices,
     row: SplitRow,
     term: tuple[Mapping[int, int], list[tuple[int, int]]],
 ) -> Factor:
-    """Return G = X - i Y from all products of cosines and sines of the joints of a term."""
+    """Return G = X - i Y of a term from all products of cosines and sines of its joints.
+
+    `term` is the powers of prismatic joints, and the pairs of joint and sign of revolute joints.
+
+    `row` is the equation, `matrices` and `knowledge` the known transforms and joints.
+    """
     prismatic, angles = term
     X, Y = SX(0), SX(0)
     for choice in product((1, 2), repeat=len(angles)):
@@ -351,18 +383,21 @@ def _coefficient(
         knowledge: known joints, whose positions are inserted.
         matrices: matrices of the known transforms.
         row: frames and element of w of the equation.
-        chosen: index of the function of each joint in the product, see `joint_basis`.
+        chosen: index of the function of each joint in the product, see `motion_parts`.
     """
     total = SX(0)
     for direction in (1, -1):
-        steps = list(_steps(row, len(matrices.on), direction))
+        steps = list(_path(row, len(matrices.on), direction))
         if all(("joint", k) in steps for k in chosen):
-            total += direction * _along(knowledge, matrices, (row, steps, direction), chosen)
+            total += direction * _path_element(knowledge, matrices, (row, steps, direction), chosen)
     return SX(total)
 
 
-def _steps(row: SplitRow, n: int, direction: int) -> Iterator[tuple[str, int]]:
-    """Yield joints and known transforms between two frames, around the loop in one direction."""
+def _path(row: SplitRow, n: int, direction: int) -> Iterator[tuple[str, int]]:
+    """Yield ("joint", k) or ("gap", k) from the start frame to the end frame of an equation `row`.
+
+    The loop has n joints and is traversed forwards (`direction` 1) or backwards (-1).
+    """
     point = row.start
     while point != row.end:
         at = point if direction > 0 else (point - 1) % (2 * n)
@@ -370,15 +405,16 @@ def _steps(row: SplitRow, n: int, direction: int) -> Iterator[tuple[str, int]]:
         point = (point + direction) % (2 * n)
 
 
-def _along(
+def _path_element(
     knowledge: KnownFrames,
     matrices: RingMatrices,
     path: tuple[SplitRow, list[tuple[str, int]], int],
     chosen: Mapping[int, int],
 ) -> SX:
-    """Return the element of w at the end of a path through joints and known transforms.
+    """Return an element of w at the end of a path through joints and known transforms.
 
-    The vector w (15,) contains products of origin and z axis of a frame.
+    `path` is the row, its steps and the direction; `chosen` is as in `_coefficient`. The vector w
+    (15,) contains products of origin and z axis of a frame.
     """
     row, steps, direction = path
     r = SX(1, SIZE)
@@ -387,15 +423,18 @@ def _along(
         if kind == "gap":
             matrix = (matrices.on if direction > 0 else matrices.back)[k]
         else:
-            matrix = _joint(knowledge, k, chosen.get(k, 0), direction)
+            matrix = _joint_matrix(knowledge, k, chosen.get(k, 0), direction)
         r = SX(casadi.sparsify(casadi.mtimes(r, matrix)))
         if r.nnz() == 0:
             return SX(0)
     return SX(r[0, 0] + r[0, 6 + row.seed])
 
 
-def _joint(knowledge: KnownFrames, k: int, number: int, direction: int) -> SX:
-    """Return one basis matrix of an unknown joint, or the matrix of a known joint."""
+def _joint_matrix(knowledge: KnownFrames, k: int, number: int, direction: int) -> SX:
+    """Return the matrix (15, 15) of joint k at its known position.
+
+    For an unknown joint, it is the basis matrix with index `number`.
+    """
     joint = knowledge.ring.joints[k]
     sign = direction * joint.sign
     if k not in knowledge.known:
@@ -408,6 +447,6 @@ def _joint(knowledge: KnownFrames, k: int, number: int, direction: int) -> SX:
 
 @cache
 def _sparse_basis(turns: bool, sign: int) -> tuple[SX, SX, SX]:
-    """Return the basis matrices of a joint that moves with or against the path."""
-    one, first, second = (SX(casadi.sparsify(DM(matrix))) for matrix in joint_basis(not turns))
+    """Return three basis matrices of a joint that moves with (sign 1) or against the path (-1)."""
+    one, first, second = (SX(casadi.sparsify(DM(matrix))) for matrix in motion_parts(not turns))
     return (one, first, sign * second) if turns else (one, sign * first, second)

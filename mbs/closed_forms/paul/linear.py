@@ -33,31 +33,46 @@ _ROWS = {1: 24, 2: 16, 3: 10, 4: 9, 5: 8, 6: 8}
 
 
 def linear(stage: PaulStage) -> Iterator[Candidate]:
-    """Yield steps that solve as many linear equations as unknown columns."""
+    """Yield steps that solve as many linear equations as unknown lengths, cosines and sines.
+
+    Args:
+        stage: known quantities and equations.
+    """
     rows = [equation for equation in stage.equations if equation.linear]
     for variables in dict.fromkeys(equation.variables for equation in rows):
         inside = [e for e in rows if set(e.variables) <= set(variables)]
         sums = any(not variable.single for variable in variables)
         order = 3.0 if sums else float(min(len(variables), 2))
-        for chosen, rank in _best(inside, variables):
+        for chosen, rank in _best_rows(inside, variables):
 
             def build(
                 chosen: tuple[Equation, ...] = chosen, v: Variables = variables
             ) -> SequenceStep:
-                return _built(stage, chosen, v)
+                return _cramer_step(stage, chosen, v)
 
             yield Candidate((order, *rank), variables, build)
 
 
 def columns(variables: Variables) -> list[tuple[Variable, str]]:
-    """Return the unknown columns of linear equations: a length, or cosine and sine of an angle."""
+    """Return the unknown columns of linear equations, as pairs of variable and kind.
+
+    Kind "r" is a length, "c" the cosine and "s" the sine of an angle.
+
+    Args:
+        variables: unknowns of the equations.
+    """
     return [
         (variable, kind) for variable in variables for kind in ("r" if variable.prismatic else "cs")
     ]
 
 
 def key_of(variable: Variable, equation: Equation) -> Key | None:
-    """Return the key of a variable alone in an equation; None if the equation has no such term."""
+    """Return the key of the term of a variable alone; None if the variable is not in the equation.
+
+    Args:
+        variable: unknown.
+        equation: equation.
+    """
     if variable not in equation.variables:
         return None
     at = equation.variables.index(variable)
@@ -65,7 +80,12 @@ def key_of(variable: Variable, equation: Equation) -> Key | None:
 
 
 def row_values(equation: Equation, variables: Variables) -> Matrix:
-    """Return the numeric coefficients (samples, columns) of an equation's variables."""
+    """Return the numeric coefficients (samples, columns) of variables in a linear equation.
+
+    Args:
+        equation: equation.
+        variables: unknowns, which define the `columns`.
+    """
     values = []
     for variable, kind in columns(variables):
         key = key_of(variable, equation)
@@ -75,7 +95,13 @@ def row_values(equation: Equation, variables: Variables) -> Matrix:
 
 
 def row_factors(stage: PaulStage, equation: Equation, variables: Variables) -> list[SX]:
-    """Return the coefficients of an equation and its constant, as expressions."""
+    """Return the symbolic coefficients of variables in a linear equation, then its constant.
+
+    Args:
+        stage: known quantities and equations.
+        equation: equation.
+        variables: unknowns, which define the `columns`.
+    """
     factors = list[SX]()
     for variable in variables:
         key = key_of(variable, equation)
@@ -87,10 +113,13 @@ def row_factors(stage: PaulStage, equation: Equation, variables: Variables) -> l
     return [*factors, stage.factor(equation, (0,) * len(equation.variables)).X]
 
 
-def _best(
+def _best_rows(
     rows: list[Equation], variables: Variables
 ) -> list[tuple[tuple[Equation, ...], tuple[float, ...]]]:
-    """Return the best selections of rows: constant determinant, cheap, well conditioned."""
+    """Return the best selections of rows that determine the variables, with their sort keys.
+
+    A constant determinant is preferred, then low cost, then good conditioning.
+    """
     width = len(columns(variables))
     first = sorted(rows, key=lambda e: e.cost)[: _ROWS.get(width, 0)]
     if len(first) < width:
@@ -111,12 +140,14 @@ def _best(
     return sorted(choices, key=lambda choice: choice[1])[:_CHOICES]
 
 
-def _built(stage: PaulStage, rows: tuple[Equation, ...], variables: Variables) -> SequenceStep:
-    """Return the step that solves the rows by Cramer's rule."""
+def _cramer_step(
+    stage: PaulStage, rows: tuple[Equation, ...], variables: Variables
+) -> SequenceStep:
+    """Return the step that solves the rows for the variables by Cramer's rule."""
     table = [row_factors(stage, row, variables) for row in rows]
     A = casadi.vertcat(*(casadi.horzcat(*row[:-1]) for row in table))
     b = casadi.vertcat(*(-row[-1] for row in table))
-    named, equation = _text(stage, table, variables)
+    named, equation = _equation_text(stage, table, variables)
     D, solved = _cramer(A, b)
     values, regular, at = dict[int, SX](), list[SX](), 0
     power = sum(row.row.power for row in rows) - sum(variable.prismatic for variable in variables)
@@ -129,12 +160,12 @@ def _built(stage: PaulStage, rows: tuple[Equation, ...], variables: Variables) -
         at += 1 if variable.prismatic else 2
     if not D.is_constant():
         regular.append(SX((D / stage.matrices.length**power) ** 2))
-    kind = _kind(variables)
+    kind = _type_name(variables)
     found = Found(values, (), tuple(regular), named)
     return step(stage.knowledge.problem, kind, equation, {}, found)
 
 
-def _kind(variables: Variables) -> str:
+def _type_name(variables: Variables) -> str:
     """Return the type of the equations: "linear" for several unknowns, else "type 1" or "type 3".
 
     Type 1 has a single length, type 3 a single angle.
@@ -155,10 +186,13 @@ def _cramer(A: SX, b: SX) -> tuple[SX, list[SX]]:
     return SX(casadi.det(A)), numerators
 
 
-def _text(
+def _equation_text(
     stage: PaulStage, table: list[list[SX]], variables: Variables
 ) -> tuple[dict[str, SX], str]:
-    """Return named coefficients of linear equations, and the equations as text."""
+    """Return the named coefficients of linear equations, and the equations as text.
+
+    `table` contains the symbolic coefficients of each equation.
+    """
     named, lines = dict[str, SX](), list[str]()
     for letter, row in zip(_letters(len(table)), table, strict=True):
         pieces, right = list[str](), "0"
@@ -177,7 +211,7 @@ def _text(
 
 
 def _letters(count: int) -> list[str]:
-    """Return letters a, b, ... that distinguish the coefficients of several equations.
+    """Return `count` letters a, b, ... that distinguish the coefficients of several equations.
 
     A single equation has an empty letter.
     """

@@ -45,15 +45,20 @@ class PaulStage:
     equations: tuple[Equation, ...]
 
     def factor(self, equation: Equation, key: Key) -> Factor:
-        """Return the coefficient of the product of variables with exponents `key`."""
+        """Return the coefficient of the monomial with exponents `key`, as an expression.
+
+        Args:
+            equation: equation of this stage.
+            key: exponents of the product, one for each variable of the equation.
+        """
         return factor(self.knowledge, self.matrices, equation, key)
 
     def number(self, variable: Variable) -> str:
-        """Return the number in the names of the coefficients of a variable."""
+        """Return the number that is part of the coefficient names of a variable."""
         return str(self.knowledge.index(variable) + 1)
 
     def term(self, variable: Variable) -> str:
-        """Return the text of a variable in an equation."""
+        """Return the text of a variable in an equation, such as "q2+q3"."""
         if variable.single:
             return self.knowledge.name(variable)
         signed = [
@@ -79,20 +84,35 @@ class Candidate:
 
 
 def unsteady(values: NDArray[np.float64]) -> float:
-    """Return 0 if a quantity is constant over the samples, else 1."""
+    """Return 0.0 if a quantity is constant over the samples, else 1.0.
+
+    Args:
+        values: (samples,) values.
+    """
     spread = float(np.max(values) - np.min(values))
     return float(spread > STEADY * float(np.max(np.abs(values))))
 
 
 def divided(numerator: SX, denominator: SX) -> SX:
-    """Return the ratio; finite for a zero denominator."""
+    """Return the ratio of two expressions, which is finite for a zero denominator.
+
+    Args:
+        numerator: expression.
+        denominator: expression.
+    """
     if denominator.is_constant():
         return SX(numerator / denominator)
     return SX(numerator * denominator / (denominator * denominator + NONZERO))
 
 
 def one_unknown(stage: PaulStage) -> Iterator[Candidate]:
-    """Yield steps of type 2 and quadratic steps, from one equation in one unknown."""
+    """Yield steps that solve one equation in one unknown with two roots.
+
+    These are X cos q + Y sin q = Z (type 2) and quadratic equations.
+
+    Args:
+        stage: known quantities and equations.
+    """
     for equation in stage.equations:
         if len(equation.variables) != 1:
             continue
@@ -125,7 +145,15 @@ def angle_step(
     power: int,
     kind: str = "type 2",
 ) -> SequenceStep:
-    """Return the step of X cos q + Y sin q = Z, whose unit is the given power of a length."""
+    """Return the step of X cos q + Y sin q = Z.
+
+    Args:
+        stage: known quantities and equations.
+        variable: angle q, or sum of angles.
+        XYZ: coefficients.
+        power: power of a length that is the unit of the coefficients.
+        kind: type of the equation.
+    """
     X, Y, Z = XYZ
     number, shown = stage.number(variable), stage.term(variable)
     names = {f"X{number}": X, f"Y{number}": Y, f"Z{number}": Z}
@@ -145,7 +173,10 @@ def angle_step(
 
 
 def _roots(index: int, XYZ: tuple[SX, SX, SX], sign: SX, scale: SX) -> Found:
-    """Return the roots of X cos q + Y sin q = Z; for Z = 0 they are opposite and always real."""
+    """Return the roots of X cos q + Y sin q = Z; for Z = 0 they are opposite and always real.
+
+    `index` is that of q in x, `scale` the typical size of the coefficients.
+    """
     X, Y, Z = XYZ
     if not Z.is_zero():
         root = cosine_root(X, Y, Z, sign, scale)
@@ -171,7 +202,14 @@ def _quadratic(stage: PaulStage, equation: Equation) -> Candidate:
 def length_step(
     stage: PaulStage, variable: Variable, abc: list[SX], kind: str = "quadratic"
 ) -> SequenceStep:
-    """Return the step that solves a r^2 + b r + c = 0."""
+    """Return the step that solves a r^2 + b r + c = 0.
+
+    Args:
+        stage: known quantities and equations.
+        variable: prismatic displacement r.
+        abc: coefficients.
+        kind: type of the equation.
+    """
     a, b, c = abc
     number, shown = stage.number(variable), stage.term(variable)
     middle = divided(b, 2 * a)

@@ -14,7 +14,7 @@ from mbs.closed_forms.paul.eliminated import eliminated
 from mbs.closed_forms.paul.equation import PRODUCTS, equations, ring_matrices
 from mbs.closed_forms.paul.linear import linear
 from mbs.closed_forms.paul.one_unknown import Candidate, PaulStage, one_unknown
-from mbs.closed_forms.paul.splits import KnownFrames, Variable, beginning
+from mbs.closed_forms.paul.splits import KnownFrames, Variable, nothing_known
 from mbs.closed_forms.paul.two_unknowns import two_unknowns
 from mbs.closed_forms.sequence import ZERO, Found, Problem, SequenceStep, StepSequence, step
 from mbs.components.joints import Motion
@@ -26,8 +26,16 @@ from mbs.spatial import Pose, vector
 
 
 def sums(stage: PaulStage) -> Iterator[Candidate]:
-    """Yield steps that subtract known angles, or another known sum, from a known sum."""
-    for rest, value, text in _alone(stage):
+    """Yield steps that determine a single angle from known sums of angles.
+
+    Known angles, or another known sum, are subtracted from a known sum.
+
+    Args:
+        stage: known quantities and equations.
+
+    A step is an explicit formula for one or more unknown joint positions.
+    """
+    for rest, value, text in _isolated_angles(stage):
 
         def build(rest: Variable = rest, value: SX = value, text: str = text) -> SequenceStep:
             turns = casadi.floor((value + casadi.pi) / (2 * casadi.pi))
@@ -37,8 +45,11 @@ def sums(stage: PaulStage) -> Iterator[Candidate]:
         yield Candidate((0.0,), (rest,), build)
 
 
-def _alone(stage: PaulStage) -> Iterator[tuple[Variable, SX, str]]:
-    """Yield each single angle that known sums determine, its value, and the equation."""
+def _isolated_angles(stage: PaulStage) -> Iterator[tuple[Variable, SX, str]]:
+    """Yield each single angle that known sums determine, its value, and the equation.
+
+    `stage` contains the known sums of angles. The equation is text, such as "q2+q3 = x6".
+    """
     knowledge = stage.knowledge
     opened = [
         (rest, value, f"{stage.term(whole)} = {knowledge.problem.x[index]}")
@@ -49,31 +60,35 @@ def _alone(stage: PaulStage) -> Iterator[tuple[Variable, SX, str]]:
     yield from (own for own in opened if own[0].single)
     for (first, a, text), (second, b, other) in combinations(opened, 2):
         for sense in (1, -1):
-            rest = _combine(first, second, sense)
+            rest = _combined_signs(first, second, sense)
             if len(rest) == 1:
                 ((k, sign),) = rest.items()
                 value = SX(a + sense * b) / sign
-                yield _angle(knowledge, k), value, f"{text}, {other}"
+                yield _joint_variable(knowledge, k), value, f"{text}, {other}"
 
 
-def _angle(knowledge: KnownFrames, k: int) -> Variable:
-    """Return the variable of a single joint k: its angle, or its displacement."""
+def _joint_variable(knowledge: KnownFrames, k: int) -> Variable:
+    """Return the variable of joint k: its angle or its displacement."""
     return Variable(not knowledge.ring.joints[k].is_rotational, ((k, 1),))
 
 
-def _combine(first: Variable, second: Variable, sense: int) -> dict[int, int]:
-    """Return the signs of the joints in the sum first + sense second, by joint.
+def _combined_signs(first: Variable, second: Variable, sense: int) -> dict[int, int]:
+    """Return the signs of the joints in the sum first + sense * second, by joint index.
 
     Empty if a coefficient is not 1 or -1.
     """
     total = dict(first.members)
     for k, sign in second.members:
         total[k] = total.get(k, 0) + sense * sign
-    return {k: sign for k, sign in total.items() if sign in (1, -1)} if _unit(total) else {}
+    return (
+        {k: sign for k, sign in total.items() if sign in (1, -1)}
+        if _has_unit_coefficients(total)
+        else {}
+    )
 
 
-def _unit(total: dict[int, int]) -> bool:
-    """Whether all coefficients of a sum of angles are -1, 0 or 1."""
+def _has_unit_coefficients(total: dict[int, int]) -> bool:
+    """Whether all values of `total`, coefficients by joint index, are -1, 0 or 1."""
     return all(abs(sign) <= 1 for sign in total.values())
 
 
@@ -85,21 +100,29 @@ def _unit(total: dict[int, int]) -> bool:
 
 
 def at_feet(problem: Problem) -> Ring:
-    """Return the loop of a problem, with the frame of each rotational joint moved along its axis.
+    """Return the loop of a problem, with the frame of each revolute joint moved along its axis.
 
     The new origin is the foot of the common normal with the next axis. The first transform of the
     loop, which contains the known pose, is not used for this.
+
+    Args:
+        problem: loop and samples.
     """
     ring = problem.ring
     for k in range(len(ring.joints) - 1):
         here, after = ring.joints[k], ring.joints[k + 1]
         if here.is_rotational and after.is_rotational and not ring.gaps[k + 1].pivots:
-            ring = _moved(problem, ring, k)
+            ring = _with_moved_frame(problem, ring, k)
     return ring
 
 
-def _moved(problem: Problem, ring: Ring, k: int) -> Ring:
-    """Return the loop with the origin of joint k at the foot of the normal to the next axis."""
+def _with_moved_frame(problem: Problem, ring: Ring, k: int) -> Ring:
+    """Return the loop with the origin of joint k at the foot of the normal to the next axis.
+
+    The same object is returned if the axes are parallel or the origin is there already.
+
+    `problem` gives the samples at which the axes of `ring` are compared.
+    """
     pose = ring.gaps[k + 1].pose
     axis, cosine = pose.R[:, 2], pose.R[2, 2]
     sine2 = axis[0] ** 2 + axis[1] ** 2
@@ -140,7 +163,7 @@ def paul(problem: Problem) -> StepSequence:
         NoClosedForm: no supported equation solves the remaining joints. The message names them.
     """
     _require_simple(problem)
-    knowledge = beginning(problem, at_feet(problem))
+    knowledge = nothing_known(problem, at_feet(problem))
     loop, steps = ring_matrices(knowledge.ring), list[SequenceStep]()
     while knowledge.unknown:
         stage = PaulStage(knowledge, loop, equations(knowledge))
@@ -158,7 +181,12 @@ def paul(problem: Problem) -> StepSequence:
 
 
 def _cheapest(stage: PaulStage) -> tuple[SequenceStep, tuple[Variable, ...]] | None:
-    """Return the step with the fewest operations among the candidates of the lowest rank."""
+    """Return the step with the fewest operations among the candidates of the lowest rank.
+
+    The second result is the variables that it solves. None if there is no candidate.
+
+    `stage` contains the known quantities and the equations.
+    """
     for kernels in _KERNELS:
         every = [
             candidate
@@ -185,16 +213,19 @@ def _require_simple(problem: Problem) -> None:
 
 
 def _refusal(stage: PaulStage, steps: Sequence[SequenceStep]) -> str:
-    """Return text with the unsolved joints and the simplest equations that contain them."""
+    """Return an error message with the unsolved joints and the equations that contain them.
+
+    `stage` is the last stage of the search, `steps` the steps that were found.
+    """
     knowledge = stage.knowledge
     left = ", ".join(knowledge.ring.joints[k].name for k in knowledge.unknown)
     given = ", ".join(name for step in steps for name in step.names)
     after = f" once {given} are known" if given else ""
-    return f"no equation gives {left}{after}: {_simplest(stage)}"
+    return f"no equation gives {left}{after}: {_simplest_text(stage)}"
 
 
-def _simplest(stage: PaulStage) -> str:
-    """Return text with the unknowns of the simplest equations that remain unsolved."""
+def _simplest_text(stage: PaulStage) -> str:
+    """Return text with the unknowns of the simplest equations that no solution type fits."""
     if not stage.equations:
         return "every equation of every split of the loop has more than two unknowns"
     groups = dict.fromkeys(

@@ -19,9 +19,10 @@ import numpy as np
 from casadi import SX, Function
 from numpy.typing import NDArray
 
+from mbs.closed_forms.arm import inverse, motion
+from mbs.closed_forms.displacement_matrices import POWERS, SIZE, motion_parts, rho
 from mbs.closed_forms.sequence import ZERO, Problem
 from mbs.recursions.chain import Ring
-from mbs.spatial import Pose
 
 # Known quantities of a search: joints, and sums of joint angles.
 
@@ -85,42 +86,47 @@ class KnownFrames:
         return [k for k in range(len(self.ring.joints)) if k not in self.known]
 
     def index(self, variable: Variable) -> int:
-        """Return the index of a variable in x. A sum of angles gets the next free index."""
+        """Return the index in x of a variable. A sum of angles gets the next free index."""
         if variable.single:
             index = self.ring.joints[variable.members[0][0]].index
             return -1 if index is None else index
         return self.problem.size + len(self.sums)
 
     def can_hold(self, variable: Variable) -> bool:
-        """Whether a variable is new, and the vector x of unknowns has a free index for it."""
+        """Whether a variable can become known: it is new, and x has a free index for a sum."""
         held = [known.members for known, _, _ in self.open_sums()]
         return variable.single or (
             variable.members not in held and self.index(variable) < self.problem.x.numel()
         )
 
     def name(self, variable: Variable) -> str:
-        """Return the name of a variable in an equation."""
+        """Return the name of a variable: the name of its joint, or of the symbol of a sum."""
         if variable.single:
             return self.ring.joints[variable.members[0][0]].name
         return str(self.problem.x[self.index(variable)])
 
     def with_joint(self, variable: Variable) -> KnownFrames:
-        """Return a copy in which one more variable is known."""
+        """Return a copy in which the variable is known too."""
         if variable.single:
             return replace(self, known=self.known | {variable.members[0][0]})
         return replace(self, sums=(*self.sums, (variable, self.index(variable))))
 
     def open_sums(self) -> list[tuple[Variable, SX, Matrix]]:
         """Return the unknown part of each known sum: variable, expression, values at samples."""
-        return [_rest(self, *known) for known in self.sums]
+        return [_unknown_part(self, *known) for known in self.sums]
 
     def position(self, k: int) -> SX:
-        """Return the symbol of joint k."""
+        """Return the symbol of the position of joint k."""
         return SX(self.problem.x[self.index(Variable(False, ((k, 1),)))])
 
 
-def _rest(knowledge: KnownFrames, variable: Variable, index: int) -> tuple[Variable, SX, Matrix]:
-    """Return a known sum without its known members: variable, expression, values at samples."""
+def _unknown_part(
+    knowledge: KnownFrames, variable: Variable, index: int
+) -> tuple[Variable, SX, Matrix]:
+    """Return the unknown part of a known sum of angles: variable, expression, values at samples.
+
+    `variable` is the sum and `index` its index in x.
+    """
     value = SX(knowledge.problem.x[index])
     members = [member for member in variable.members if member[0] not in knowledge.known]
     for k, sign in variable.members:
@@ -134,13 +140,18 @@ def _rest(knowledge: KnownFrames, variable: Variable, index: int) -> tuple[Varia
     return Variable(False, tuple(members)), value, at_samples
 
 
-def beginning(problem: Problem, ring: Ring) -> KnownFrames:
-    """Return the state at the start of a search, with no known joint."""
+def nothing_known(problem: Problem, ring: Ring) -> KnownFrames:
+    """Return the known quantities at the start of a search: none.
+
+    Args:
+        problem: loop and samples.
+        ring: loop chain with the same joints and chosen frame origins.
+    """
     return KnownFrames(problem, ring, _samples(problem, ring))
 
 
 def _samples(problem: Problem, ring: Ring) -> LoopSamples:
-    """Return the loop transforms and positions at the random configurations of the problem.
+    """Return transforms and positions of the loop chain at the samples of the problem.
 
     Lengths are divided by the mean length of the transforms.
     """
@@ -153,96 +164,6 @@ def _samples(problem: Problem, ring: Ring) -> LoopSamples:
     gaps[..., :3, 3] /= length
     prismatic = [not joint.is_rotational for joint in ring.joints]
     return LoopSamples(gaps, np.where(prismatic, q / length, q))
-
-
-# Rigid transforms as 15 x 15 matrices that act on the invariants of a point and a line.
-#
-# For a point p and a direction l, the vector w = (1, p.p, p.l, p, l, p x l, (p.p) l - 2 (p.l) p)
-# transforms linearly under each rigid transform. A product of transforms is a product of these
-# matrices.
-#
-# Source: Raghavan & Roth 1993, section 4, whose fourteen equations are the rows of w.
-
-
-SIZE = 15
-POWERS = (0, 2, 1, 1, 1, 1, 0, 0, 0, 1, 1, 1, 2, 2, 2)
-"""Power of a length in each element of w."""
-
-_P, _L, _X, _M = slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 15)
-
-
-def represented(T: Matrix) -> Matrix:
-    """Return matrices (..., 15, 15) of transforms (..., 4, 4) that act on the vector w."""
-    R, t = T[..., :3, :3], T[..., :3, 3]
-    tt, cross = np.sum(t * t, axis=-1)[..., None, None], _skew(t)
-    back = np.einsum("...ji,...j->...i", R, t)
-    D = np.zeros((*T.shape[:-2], SIZE, SIZE))
-    D[..., range(3), range(3)] = 1.0
-    for block in (_P, _L, _X, _M):
-        D[..., block, block] = R
-    D[..., 1, 0], D[..., 1, _P] = tt[..., 0, 0], 2 * back
-    D[..., 2, _L], D[..., _P, 0], D[..., _X, _L] = back, t, cross @ R
-    outer = t[..., :, None] * back[..., None, :]
-    D[..., _M, _X], D[..., _M, _L], D[..., _M, 2] = -2 * cross @ R, tt * R - 2 * outer, -2 * t
-    return D
-
-
-def represented_pose(pose: Pose, opposite: Pose) -> SX:
-    """Return the matrix (15, 15) of a pose, sparse; `opposite` is its inverse, maybe shorter."""
-    R, t, back = pose.R, pose.p, -opposite.p
-    tt = min((casadi.sumsqr(p) for p in (t, opposite.p)), key=casadi.n_nodes)
-    cross = casadi.skew(t)
-    turned = casadi.mtimes(cross, R)
-    D = SX(SIZE, SIZE)
-    D[0, 0] = D[1, 1] = D[2, 2] = 1
-    for block in (_P, _L, _X, _M):
-        D[block, block] = R
-    D[1, 0], D[1, _P], D[2, _L] = tt, 2 * back.T, back.T
-    D[_P, 0], D[_X, _L], D[_M, 2] = t, turned, -2 * t
-    D[_M, _X] = -2 * turned
-    D[_M, _L] = tt * R - 2 * casadi.mtimes(t, back.T)
-    return SX(casadi.sparsify(D))
-
-
-def joint_basis(prismatic: bool) -> Matrix:
-    """Return factors (3, 15, 15) of 1, cos q, sin q (rotation), or of 1, r, r^2 (translation)."""
-    T = np.broadcast_to(np.eye(4), (3, 4, 4)).copy()
-    if prismatic:
-        T[1, 2, 3], T[2, 2, 3] = 1.0, -1.0
-        one, up, down = represented(T)
-        return np.array([one, (up - down) / 2, (up + down) / 2 - one])
-    T[1, :2, :2], T[2, :2, :2] = [[0, -1], [1, 0]], [[-1, 0], [0, -1]]
-    one, quarter, half = represented(T)
-    mean = (one + half) / 2
-    return np.array([mean, (one - half) / 2, quarter - mean])
-
-
-def motion(q: Matrix, prismatic: bool) -> Matrix:
-    """Return (..., 4, 4) transforms: translation along z, or rotation about z, by q."""
-    T = np.zeros((*q.shape, 4, 4))
-    T[..., range(4), range(4)] = 1.0
-    if prismatic:
-        T[..., 2, 3] = q
-        return T
-    c, s = np.cos(q), np.sin(q)
-    T[..., 0, 0], T[..., 0, 1], T[..., 1, 0], T[..., 1, 1] = c, -s, s, c
-    return T
-
-
-def inverse(T: Matrix) -> Matrix:
-    """Return the inverses (..., 4, 4) of rigid transforms."""
-    back = np.zeros_like(T)
-    R = np.swapaxes(T[..., :3, :3], -1, -2)
-    back[..., :3, :3], back[..., 3, 3] = R, 1.0
-    back[..., :3, 3] = -np.einsum("...ij,...j->...i", R, T[..., :3, 3])
-    return back
-
-
-def _skew(t: Matrix) -> Matrix:
-    """Return the matrices (..., 3, 3) of the cross product with vectors t (..., 3)."""
-    S = np.zeros((*t.shape, 3))
-    S[..., 0, 1], S[..., 0, 2], S[..., 1, 2] = -t[..., 2], t[..., 1], -t[..., 0]
-    return S - np.swapaxes(S, -1, -2)
 
 
 Tensor = NDArray[np.complex128]
@@ -288,7 +209,11 @@ class FrameSplit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pieces:
-    """Matrices of the unknown joints and of the transforms between them, in one representation."""
+    """Matrices on w, or on directions only, from which the sides of equations are multiplied.
+
+    `joints` are the unknown joints, `gaps` and `back` transforms between them in both directions,
+    `turns` and `turns_back` the joint factors of `_joint_factors` in both directions.
+    """
 
     joints: list[int]
     gaps: list[Matrix]
@@ -299,7 +224,11 @@ class _Pieces:
 
 
 def splits(knowledge: KnownFrames) -> Iterator[FrameSplit]:
-    """Yield each split of the loop with few unknown joints on each side."""
+    """Yield each split of the loop into two sides with few unknown joints each.
+
+    Args:
+        knowledge: known joints and sums.
+    """
     whole = _pieces(knowledge, slice(0, SIZE))
     directions = _pieces(knowledge, _DIRECTION)
     w = np.zeros((SIZE, 1))
@@ -307,12 +236,12 @@ def splits(knowledge: KnownFrames) -> Iterator[FrameSplit]:
     for e, k in enumerate(whole.joints):
         prismatic = k in whole.prismatic
         for end in (2 * k, 2 * k + 1) if prismatic else (2 * k,):
-            yield from _of_end(whole, w, (e, prismatic), (end, 2))
+            yield from _splits_to(whole, w, (e, prismatic), (end, 2))
         for end in (2 * k,) if prismatic else (2 * k, 2 * k + 1):
-            yield from _of_end(directions, np.eye(3)[:, :2], (e, not prismatic), (end, 0))
+            yield from _splits_to(directions, np.eye(3)[:, :2], (e, not prismatic), (end, 0))
 
 
-def _of_end(
+def _splits_to(
     pieces: _Pieces, seed: Matrix, joint: tuple[int, bool], end: tuple[int, int]
 ) -> Iterator[FrameSplit]:
     """Yield the splits with one observed frame.
@@ -326,20 +255,25 @@ def _of_end(
     (e, moves), (point, axis) = joint, end
     samples = len(pieces.gaps[0])
     first = np.broadcast_to(seed, (samples, *seed.shape)).astype(complex)
-    left = _walk_back(pieces, first, e, moves and point % 2 == 1)
-    right = _walk_on(pieces, first, e, moves and point % 2 == 0)
+    left = _walk(pieces, first, e, moves and point % 2 == 1, forward=False)
+    right = _walk(pieces, first, e, moves and point % 2 == 0, forward=True)
     for start, side in left.items():
         other = right.get(start)
         if other is None or start == point:
             continue
         for column in range(seed.shape[1]):
             sides = (Side(s.joints, s.values[:, :, column]) for s in (side, other))
-            rows = _rows(axis, start, start // 2 in pieces.prismatic)
+            rows = _new_rows(axis, start, start // 2 in pieces.prismatic)
             yield FrameSplit(start, point, axis + column, rows, *sides)
 
 
-def _rows(axis: int, start: int, prismatic: bool) -> tuple[int, ...]:
-    """Return the elements of w that give new equations: those that joint `start` changes."""
+def _new_rows(axis: int, start: int, prismatic: bool) -> tuple[int, ...]:
+    """Return indices in w (15,) of the equations that are new if the reference frame is `start`.
+
+    `axis` is the index of the observed axis, and `prismatic` the type of the joint at `start`.
+
+    w are the products of `frame_products`, equal on both paths around the loop.
+    """
     after = start % 2 == 1
     if axis == 2:
         return (3, 4, 6, 7, 9, 10, 12, 13) if after and not prismatic else tuple(range(1, SIZE))
@@ -348,51 +282,40 @@ def _rows(axis: int, start: int, prismatic: bool) -> tuple[int, ...]:
     return (6, 7) if after else (6, 7, 8)
 
 
-def _walk_back(pieces: _Pieces, first: Tensor, e: int, turned: bool) -> Mapping[int, Side]:
-    """Return the observed vectors in the frames before joint e, by frame index."""
+def _walk(
+    pieces: _Pieces, first: Tensor, e: int, turned: bool, forward: bool
+) -> Mapping[int, Side]:
+    """Return the observed vectors in the frames on one path from joint e, by frame index.
+
+    `first` are the vectors in the frame of joint e; `turned` is whether its motion acts on them,
+    and `forward` the direction of the path along the loop.
+    """
+    gaps, turns = (pieces.back, pieces.turns_back) if forward else (pieces.gaps, pieces.turns)
     m, found = len(pieces.joints), dict[int, Side]()
-    side = Side((), first[..., None])
+    side, j = Side((), first[..., None]), e
     if turned:
-        side = _through(side, pieces.joints[e], pieces.turns[e])
-    for step in range(m):
-        j = (e - step) % m
-        found[2 * pieces.joints[j]] = side
-        side = _over(side, pieces.gaps[j])
-        before = (j - 1) % m
-        found.setdefault(2 * pieces.joints[before] + 1, side)
+        side = _with_joint(side, pieces.joints[e], turns[e])
+    for _ in range(m):
+        found[2 * pieces.joints[j] + forward] = side
+        following = (j + 1 if forward else j - 1) % m
+        side = _multiplied(side, gaps[following if forward else j])
+        found.setdefault(2 * pieces.joints[following] + (not forward), side)
         if len(side.joints) == _MOST:
             break
-        side = _through(side, pieces.joints[before], pieces.turns[before])
+        j = following
+        side = _with_joint(side, pieces.joints[j], turns[j])
     return found
 
 
-def _walk_on(pieces: _Pieces, first: Tensor, e: int, turned: bool) -> Mapping[int, Side]:
-    """Return the observed vectors in the frames after joint e, by frame index."""
-    m, found = len(pieces.joints), dict[int, Side]()
-    side = Side((), first[..., None])
-    if turned:
-        side = _through(side, pieces.joints[e], pieces.turns_back[e])
-    for step in range(m):
-        j = (e + step) % m
-        found[2 * pieces.joints[j] + 1] = side
-        after = (j + 1) % m
-        side = _over(side, pieces.back[after])
-        found.setdefault(2 * pieces.joints[after], side)
-        if len(side.joints) == _MOST:
-            break
-        side = _through(side, pieces.joints[after], pieces.turns_back[after])
-    return found
-
-
-def _over(side: Side, matrix: Matrix) -> Side:
+def _multiplied(side: Side, matrix: Matrix) -> Side:
     """Return one side of the loop equation multiplied by a matrix."""
     S, d = matrix.shape[:2]
     values = matrix @ side.values.reshape(S, d, -1)
     return Side(side.joints, values.reshape(side.values.shape))
 
 
-def _through(side: Side, k: int, basis: Tensor) -> Side:
-    """Return the side multiplied by the basis (3, d, d) of a further joint."""
+def _with_joint(side: Side, k: int, basis: Tensor) -> Side:
+    """Return the side multiplied by the factors (3, d, d) of a further unknown joint k."""
     S, d, columns, K = side.values.shape
     moved = basis[:, None] @ side.values.reshape(S, d, -1)
     values = np.moveaxis(moved.reshape(3, S, d, columns, K), 0, -1)
@@ -402,19 +325,20 @@ def _through(side: Side, k: int, basis: Tensor) -> Side:
 def _pieces(knowledge: KnownFrames, block: slice) -> _Pieces:
     """Return the matrices of the unknown joints and of the transforms between them.
 
-    The slice `block` selects rows and columns of the representation on w (15,).
+    The slice `block` selects rows and columns of the matrices that act on w (15,), see
+    `frame_products`.
     """
     joints = knowledge.unknown
-    gaps = [_merge(knowledge, k) for k in joints]
-    ways = [represented(T)[:, block, block] for T in gaps]
-    back = [represented(inverse(T))[:, block, block] for T in gaps]
-    turns = [_basis(knowledge, k, 1)[:, block, block] for k in joints]
-    turns_back = [_basis(knowledge, k, -1)[:, block, block] for k in joints]
+    gaps = [_merged_transform(knowledge, k) for k in joints]
+    ways = [rho(T)[:, block, block] for T in gaps]
+    back = [rho(inverse(T))[:, block, block] for T in gaps]
+    turns = [_joint_factors(knowledge, k, 1)[:, block, block] for k in joints]
+    turns_back = [_joint_factors(knowledge, k, -1)[:, block, block] for k in joints]
     prismatic = frozenset(k for k in joints if not knowledge.ring.joints[k].is_rotational)
     return _Pieces(joints, ways, back, turns, turns_back, prismatic)
 
 
-def _merge(knowledge: KnownFrames, k: int) -> Matrix:
+def _merged_transform(knowledge: KnownFrames, k: int) -> Matrix:
     """Return the transform (samples, 4, 4) from the previous unknown joint to joint k."""
     ring, samples = knowledge.ring, knowledge.samples
     T, n = samples.gaps[:, k], len(ring.joints)
@@ -427,10 +351,13 @@ def _merge(knowledge: KnownFrames, k: int) -> Matrix:
     return T
 
 
-def _basis(knowledge: KnownFrames, k: int, direction: int) -> Tensor:
-    """Return factors (3, 15, 15) of e^-iq, 1, e^iq, or of r, 1, r^2."""
+def _joint_factors(knowledge: KnownFrames, k: int, direction: int) -> Tensor:
+    """Return the factors (3, 15, 15) of e^-iq, 1, e^iq of joint k, or of r, 1, r^2.
+
+    The direction is 1 along the loop and -1 against it.
+    """
     joint = knowledge.ring.joints[k]
-    one, first, second = joint_basis(not joint.is_rotational)
+    one, first, second = motion_parts(not joint.is_rotational)
     if not joint.is_rotational:
         return np.array([direction * joint.sign * first, one, second], dtype=complex)
     up = (first - 1j * direction * joint.sign * second) / 2
@@ -492,12 +419,15 @@ def simple_rows(
         row = SplitRow(split.start, split.end, split.seed, split.rows[number])
         found = dict[Members, Values]()
         for side, table, mask, sign in zip(sides, tables, masks, (1, -1), strict=True):
-            _collect(found, (side, table.terms, mask[number]), rows[number], sign)
+            _collect_terms(found, (side, table.terms, mask[number]), rows[number], sign)
         yield row, found
 
 
 def _counts(table: _Table, mask: NDArray[np.bool_]) -> NDArray[np.int_]:
-    """Return per row (3, rows): minimum number of variables, numbers of joints and products."""
+    """Return three counts (3, rows) of the terms that a mask (rows, terms) selects from a table.
+
+    They are a lower bound of the number of variables, and the numbers of joints and of products.
+    """
     weights = mask.astype(int)
     joints = (weights @ table.has) > 0
     together = np.zeros(joints.shape, dtype=bool)
@@ -507,13 +437,16 @@ def _counts(table: _Table, mask: NDArray[np.bool_]) -> NDArray[np.int_]:
     return np.array([count - together.sum(axis=1), count, weights @ table.long])
 
 
-def _collect(
+def _collect_terms(
     found: dict[Members, Values],
     source: tuple[Side, list[Members | None], NDArray[np.bool_]],
     row: int,
     sign: int,
 ) -> None:
-    """Add the masked terms of a row of a side, times `sign`, to the terms found so far."""
+    """Add `sign` times the terms of a row of a side to `found`, in place.
+
+    `source` is the side, its terms, and a mask of the terms that are not zero.
+    """
     side, terms, mask = source
     for k in np.flatnonzero(mask):
         term = terms[k]
@@ -544,7 +477,7 @@ class _Table:
 
 @lru_cache(maxsize=4096)
 def _table(joints: tuple[int, ...], prismatic: frozenset[int]) -> _Table:
-    """Return the products of powers of joint variables that occur on one side of an equation."""
+    """Return the terms of a side with these joints: products of powers of joint variables."""
     every = list(product((-1, 0, 1), repeat=len(joints)))
     terms = list[Members | None]()
     for row in every:

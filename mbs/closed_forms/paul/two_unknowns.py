@@ -78,7 +78,11 @@ class _Pair:
 
 
 def two_unknowns(stage: PaulStage) -> Iterator[Candidate]:
-    """Yield steps that solve one of two unknowns from two equations."""
+    """Yield steps that solve one of two unknowns from two equations in both.
+
+    Args:
+        stage: known quantities and equations.
+    """
     groups = dict[tuple[Variable, ...], list[Equation]]()
     for equation in stage.equations:
         if len(equation.variables) == 2:
@@ -96,7 +100,10 @@ def two_unknowns(stage: PaulStage) -> Iterator[Candidate]:
 
 
 def _fits(row: Equation, stays: int) -> bool:
-    """Whether an equation is linear in the variable to eliminate and of low degree in the other."""
+    """Whether an equation is linear in the variable to eliminate and of low degree in the other.
+
+    `stays` is the index (0 or 1) of the variable that remains.
+    """
     most = 2 if row.variables[stays].prismatic else 1
     return any(key[1 - stays] for key in row.parts) and all(
         abs(key[1 - stays]) <= 1 and abs(key[stays]) <= most for key in row.parts
@@ -104,6 +111,10 @@ def _fits(row: Equation, stays: int) -> bool:
 
 
 def _candidate(stage: PaulStage, rows: tuple[Equation, Equation], stays: int) -> Candidate | None:
+    """Return the step of two equations with variable `stays` (0 or 1); None if it is impossible.
+
+    `rows` are the two equations; the other variable is eliminated.
+    """
     forms = [_form_of_values(row, stays) for row in rows]
     power = _common_power(forms)
     if power is None:
@@ -123,13 +134,13 @@ def _candidate(stage: PaulStage, rows: tuple[Equation, Equation], stays: int) ->
     # rank 6 to 7.5, after single equations: quadratics before quartics, joints before sums of
     # joints
     rank = (6.0 + quartic + sums, unsteady(leading), cost)
-    return Candidate(rank, (pair.variable,), lambda: _built(stage, pair, shares))
+    return Candidate(rank, (pair.variable,), lambda: _pair_step(stage, pair, shares))
 
 
 def _common_power(forms: Sequence[_Form]) -> int | None:
-    """Return the index of a factor of G that is independent in both forms, or None.
+    """Return the index of a factor of G from which the other unknown follows in both forms.
 
-    The result is None if the other factors do not have the same ratio.
+    None if the factors are dependent, or do not have one ratio.
     """
     first, second = (np.array([re + 1j * im for re, im in _spread(form.G)]) for form in forms)
     sizes = np.min(np.abs(first), axis=1)
@@ -143,13 +154,16 @@ def _common_power(forms: Sequence[_Form]) -> int | None:
 
 
 def _spread(G: list[Complex]) -> list[Complex]:
-    """Return pairs of arrays, all broadcast to one shape."""
+    """Return the pairs (real, imaginary) of arrays in G, broadcast to one shape."""
     arrays = np.broadcast_arrays(*(part for pair in G for part in pair))
     return [(arrays[2 * k], arrays[2 * k + 1]) for k in range(len(G))]
 
 
 def _form_of_values(row: Equation, stays: int) -> _Form:
-    """Return the form of an equation with numeric coefficients."""
+    """Return an equation `row` as Re(G(y) e^iq) + B(y) = 0 with numeric coefficients.
+
+    `stays` is the index (0 or 1) of the variable y that remains; q is eliminated.
+    """
 
     def part(key: Key) -> Complex:
         values = row.at(key)
@@ -159,7 +173,12 @@ def _form_of_values(row: Equation, stays: int) -> _Form:
 
 
 def _form(row: Equation, stays: int, part: Callable[[Key], Complex]) -> _Form:
-    """Return the form of an equation from X and Y of each part."""
+    """Return an equation as Re(G(y) e^iq) + B(y) = 0, in the remaining unknown y and the other, q.
+
+    `stays` is the index (0 or 1) of the variable y that remains.
+
+    `part` maps the exponents of a product of the variables to its coefficients X and Y.
+    """
     prismatic = row.variables[stays].prismatic
 
     def key(y: int, q: int) -> Key:
@@ -179,18 +198,24 @@ def _form(row: Equation, stays: int, part: Callable[[Key], Complex]) -> _Form:
 
 
 def _resultant(forms: Sequence[_Form], power: int, prismatic: bool) -> Numbers:
-    """Return the coefficients of the equation in y alone: of 1, y .. y^4, or 1, c, s, c2, s2."""
+    """Return the coefficients of the equation in y alone: of 1, y .. y^4, or 1, c, s, c2, s2.
+
+    `power` is the index of the factor by which the other unknown is eliminated.
+
+    `forms` are the two equations, `prismatic` whether y is a length; c and s are cosine and sine of
+    y, c2 and s2 of 2 y.
+    """
     (x, y), (u, v) = forms[0].G[power], forms[1].G[power]
     n, a, b = x * x + y * y, u * x + v * y, v * x - u * y
     other = [a * one - n * two for one, two in zip(forms[0].B, forms[1].B, strict=True)]
-    squares = [_square(forms[0].B, prismatic), _square(other, prismatic)]
-    size = _size(forms[0].G, prismatic)
+    squares = [_squared(forms[0].B, prismatic), _squared(other, prismatic)]
+    size = _squared_magnitude(forms[0].G, prismatic)
     return [
         b * b * one + two - b * b * three for one, two, three in zip(*squares, size, strict=True)
     ]
 
 
-def _square(B: Numbers, prismatic: bool) -> Numbers:
+def _squared(B: Numbers, prismatic: bool) -> Numbers:
     """Return the coefficients of the square of B[0] + B[1] y + B[2] y^2 of a length y.
 
     For an angle, B multiplies 1, cos y, sin y, and the result multiplies 1, c, s, c2, s2.
@@ -201,13 +226,13 @@ def _square(B: Numbers, prismatic: bool) -> Numbers:
     return [z * z + (x * x + y * y) / 2, 2 * z * x, 2 * z * y, (x * x - y * y) / 2, x * y]
 
 
-def _size(G: list[Complex], prismatic: bool) -> Numbers:
+def _squared_magnitude(G: list[Complex], prismatic: bool) -> Numbers:
     """Return the coefficients of the squared magnitude of the complex form G in y.
 
-    They have the order of `_square`.
+    They have the order of `_squared`.
     """
     if prismatic:
-        parts = [_square([part[k] for part in G], True) for k in (0, 1)]
+        parts = [_squared([part[k] for part in G], True) for k in (0, 1)]
         return [one + two for one, two in zip(*parts, strict=True)]
     (a, b), (c, d), (e, f) = G
     first = (c * a + d * b + e * c + f * d, d * a - c * b + f * c - e * d)
@@ -216,8 +241,8 @@ def _size(G: list[Complex], prismatic: bool) -> Numbers:
     return [constant, 2 * first[0], -2 * first[1], 2 * second[0], -2 * second[1]]
 
 
-def _built(stage: PaulStage, pair: _Pair, shares: Any) -> SequenceStep:
-    """Return the step of a pair of equations."""
+def _pair_step(stage: PaulStage, pair: _Pair, shares: Any) -> SequenceStep:
+    """Return the step of a pair of equations; `shares` masks the nonzero coefficients."""
 
     def forms(row: Equation) -> _Form:
         def part(key: Key) -> Complex:
@@ -232,13 +257,13 @@ def _built(stage: PaulStage, pair: _Pair, shares: Any) -> SequenceStep:
     powers = [row.row.power for row in pair.rows]
     unit = 4 * powers[0] + 2 * powers[1] - (4 * pair.power if prismatic else 0)
     if np.any(shares[3:]):
-        return _quartic(stage, pair.variable, F, unit)
+        return _quartic_step(stage, pair.variable, F, unit)
     if prismatic:
-        return length_step(stage, pair.variable, F[2::-1], _kind(pair))
-    return angle_step(stage, pair.variable, (F[1], F[2], -F[0]), unit, _kind(pair))
+        return length_step(stage, pair.variable, F[2::-1], _type_name(pair))
+    return angle_step(stage, pair.variable, (F[1], F[2], -F[0]), unit, _type_name(pair))
 
 
-def _kind(pair: _Pair) -> str:
+def _type_name(pair: _Pair) -> str:
     """Return the type of a pair of equations in the table of Khalil: "type 4" to "type 8"."""
     goes = 1 - pair.stays
     factors = {abs(key[pair.stays]) for row in pair.rows for key in row.parts if key[goes]}
@@ -251,8 +276,11 @@ def _kind(pair: _Pair) -> str:
     return "type 6" if plain else "type 7"
 
 
-def _quartic(stage: PaulStage, variable: Variable, F: list[SX], unit: int) -> SequenceStep:
-    """Return the step of a quartic, with four roots."""
+def _quartic_step(stage: PaulStage, variable: Variable, F: list[SX], unit: int) -> SequenceStep:
+    """Return the step of a quartic with coefficients F and four roots.
+
+    `unit` is the power of a length that is the unit of F.
+    """
     number, shown = stage.number(variable), stage.term(variable)
     signs = SX.sym("sign", 2)
     scale = stage.matrices.length**unit if unit else SX(1)

@@ -15,11 +15,9 @@ import numpy as np
 from casadi import DM, SX
 from numpy.typing import NDArray
 
+from mbs.closed_forms.displacement_matrices import SIZE, SLOPES, Array
 from mbs.closed_forms.raghavan_roth.numbers import (
     REGULAR,
-    SIZE,
-    SLOPES,
-    Array,
     Elimination,
     Pencil,
     at,
@@ -43,15 +41,15 @@ _ZERO = 1e-12
 a zero has rounding of 1e-14, and other entries are larger at one of the generic samples."""
 
 
-def table(elimination: Elimination, ways: Sequence[Pose]) -> SX:
+def table(elimination: Elimination, transforms: Sequence[Pose]) -> SX:
     """Return the equations of a loop (s - 1, m + n3 n4 n5), one column per monomial.
 
     Args:
         elimination: elimination of joints 1 and 2. Their m = n1 n2 - 1 monomials are the first
             columns. Then follow the columns of x4^i x5^j for each part of joint 3.
-        ways: six constant transforms of the loop.
+        transforms: six constant transforms of the loop.
     """
-    right, left = _right_side(elimination, ways), _left_side(elimination, ways)
+    right, left = _right_side(elimination, transforms), _left_side(elimination, transforms)
     sides = (
         part - casadi.mtimes(right[:, 0], SX(DM(one)).T)
         for part, one in zip(left, elimination.one, strict=True)
@@ -80,12 +78,17 @@ def eliminated(A: SX, values: Array, columns: int, rank: int) -> tuple[SX, Array
         factors = values[:, :, c] / chosen[:, None, c]
         values = values - factors[:, :, None] * chosen[:, None]
         for k in np.nonzero(np.any(np.abs(factors) > _ZERO, axis=0))[0]:
-            rows[k] = _clear(rows[k] - rows[k][c] / pivot[c] * pivot, values[:, k])
+            rows[k] = _without_vanishing(rows[k] - rows[k][c] / pivot[c] * pivot, values[:, k])
     return SX(casadi.vertcat(*rows)[:, columns:]), values[:, :, columns:]
 
 
 def independent_rows(values: Array, count: int) -> list[int]:
-    """Return ascending indices of `count` rows of (samples, rows, n) independent at all samples."""
+    """Return ascending indices of rows that are independent at all samples.
+
+    Args:
+        values: (samples, rows, n) numeric matrices.
+        count: number of rows to select.
+    """
     left, numbers, found = values, np.arange(values.shape[1]), list[int]()
     for _ in range(count):
         r, c = _pivot(left)
@@ -98,7 +101,12 @@ def independent_rows(values: Array, count: int) -> list[int]:
 
 
 def dialytic(elimination: Elimination, E: SX) -> SX:
-    """Return k equations of one part of joint 3 and their products by x4 or x5, (2 k, size)."""
+    """Return equations of one part of joint 3, and their products by x4 or x5, (2 k, size).
+
+    Args:
+        elimination: elimination of joints 1 and 2.
+        E: (k, n4 n5) equations.
+    """
     g5, raised = elimination.grid[1], elimination.raised
     n4, n5 = len(elimination.fourth), len(elimination.fifth)
     M = SX(2 * E.size1(), elimination.size)
@@ -110,42 +118,57 @@ def dialytic(elimination: Elimination, E: SX) -> SX:
 
 
 def _pivot(values: Array) -> tuple[int, int]:
-    """Return row and column of the entry whose smallest absolute value over samples is largest."""
+    """Return (row, column) of the entry whose minimum magnitude over the samples is largest.
+
+    `values` are the matrices (samples, rows, columns).
+    """
     smallest = np.min(np.abs(values), axis=0)
     r, c = np.unravel_index(first_best(smallest.ravel()), smallest.shape)
     return int(r), int(c)
 
 
-def _clear(row: SX, values: Array) -> SX:
-    """Return the row with zeros for the entries that vanish at all samples."""
+def _without_vanishing(row: SX, values: Array) -> SX:
+    """Return the row (1, n) with zeros for the entries whose values vanish at all samples."""
     cleared = SX(1, row.size2())
     for k in np.nonzero(np.any(np.abs(values) > _ZERO, axis=0))[0]:
         cleared[0, int(k)] = row[0, int(k)]
     return cleared
 
 
-def _right_side(elimination: Elimination, ways: Sequence[Pose]) -> SX:
-    """Return the side of the loop equation with joints 1 and 2, by their monomials."""
-    u = _pair(ways[5].inverse())[elimination.elements.tolist()]
-    once = _carry(elimination, ways[0].inverse(), _moved(elimination.first, u))
-    return _carry(elimination, ways[1].inverse(), _moved(elimination.second, once))
+def _right_side(elimination: Elimination, transforms: Sequence[Pose]) -> SX:
+    """Return the side of the loop equation with joints 1 and 2, (s, n1 n2), by their monomials.
+
+    `transforms` are the six transforms of the loop; transform k follows joint k.
+    """
+    u = _origin_axis_products(transforms[5].inverse())[elimination.elements.tolist()]
+    once = _carry(elimination, transforms[0].inverse(), _products_with_parts(elimination.first, u))
+    return _carry(
+        elimination, transforms[1].inverse(), _products_with_parts(elimination.second, once)
+    )
 
 
-def _left_side(elimination: Elimination, ways: Sequence[Pose]) -> list[SX]:
-    """Return the side of the loop equation with the joints 3, 4 and 5, by parts of joint 3."""
-    w = _pair(ways[4])[elimination.elements.tolist()]
-    once = _carry(elimination, ways[3], _moved(elimination.fifth, w))
-    twice = _carry(elimination, ways[2], _moved(elimination.fourth, once))
-    return [_moved(part[None], twice) for part in elimination.third]
+def _left_side(elimination: Elimination, transforms: Sequence[Pose]) -> list[SX]:
+    """Return the side of the loop equation with joints 3, 4 and 5, for each part of joint 3.
+
+    `transforms` are the six transforms of the loop. The columns are the monomials of joints 4
+    and 5.
+    """
+    w = _origin_axis_products(transforms[4])[elimination.elements.tolist()]
+    once = _carry(elimination, transforms[3], _products_with_parts(elimination.fifth, w))
+    twice = _carry(elimination, transforms[2], _products_with_parts(elimination.fourth, once))
+    return [_products_with_parts(part[None], twice) for part in elimination.third]
 
 
-def _moved(parts: Array, columns: SX) -> SX:
-    """Return the columns multiplied by each part, side by side."""
+def _products_with_parts(parts: Array, columns: SX) -> SX:
+    """Return the products part @ columns of all `parts` (k, s, s), side by side (s, k columns)."""
     return SX(casadi.horzcat(*(casadi.mtimes(_constant(part), columns) for part in parts)))
 
 
 def _carry(elimination: Elimination, T: Pose, columns: SX) -> SX:
-    """Return columns of w transformed by a symbolic pose T."""
+    """Return `columns` (s, n) of w after the transform T, for the s used elements of w.
+
+    w are the 15 products of `frame_products`.
+    """
     own = elimination.elements.tolist()
     X = SX(SIZE, SIZE)
     for t, slope in zip(casadi.vertsplit(T.p), SLOPES, strict=True):
@@ -155,7 +178,7 @@ def _carry(elimination: Elimination, T: Pose, columns: SX) -> SX:
     return SX(casadi.mtimes(casadi.sparsify(rho[own, own]), columns))
 
 
-def _pair(T: Pose) -> SX:
+def _origin_axis_products(T: Pose) -> SX:
     """Return w (15, 1): 1 and the products of origin p and z axis of a pose."""
     p, z = T.p, T.R[:, 2]
     pp, pz = casadi.dot(p, p), casadi.dot(p, z)
@@ -163,7 +186,7 @@ def _pair(T: Pose) -> SX:
 
 
 def _constant(part: NDArray[np.float64]) -> SX:
-    """Return a numeric matrix as a sparse expression."""
+    """Return a numeric matrix `part` as a sparse expression of the same shape."""
     return SX(casadi.sparsify(DM(part)))
 
 
@@ -193,7 +216,11 @@ class Characteristic:
     regularity: float
 
     def matrix(self, q: SX) -> SX:
-        """Return the matrix (n, n) at a position of the joint [rad or m]."""
+        """Return the matrix (n, n) at a position of the joint [rad or m].
+
+        Args:
+            q: position of the joint.
+        """
         first, *others = self.matrices
         factors = (q, q * q) if self.prismatic else (casadi.cos(q), casadi.sin(q))
         parts = [SX(f * part) for f, part in zip(factors, others, strict=False)]
@@ -215,7 +242,7 @@ class _Loop:
         return self.pencil.merit * (_FOLDED if constant else 1.0)
 
     @property
-    def ways(self) -> list[Pose]:
+    def transforms(self) -> list[Pose]:
         """Transforms in units of the length: transform k follows joint k."""
         gaps = (*self.ring.gaps[1:], self.ring.gaps[0])
         return [Pose(gap.pose.R, gap.pose.p / self.length) for gap in gaps]
@@ -258,8 +285,8 @@ def _loops(problem: Problem) -> list[_Loop]:
             prismatic = np.array([not joint.is_rotational for joint in own.joints])
             if prismatic[5]:
                 continue
-            ways = _numbers(problem, own, length)
-            pencils = (pencil(elimination, ways) for elimination in eliminations(prismatic))
+            transforms = _numeric_transforms(problem, own, length)
+            pencils = (pencil(elimination, transforms) for elimination in eliminations(prismatic))
             found += [_Loop(own, one, length) for one in pencils if one.regularity > REGULAR]
     return found
 
@@ -272,42 +299,42 @@ def _length(problem: Problem) -> float:
     return float(2.0 ** round(np.log2(mean))) if mean > 0 else 1.0
 
 
-def _numbers(problem: Problem, ring: Ring, length: float) -> Array:
-    """Return the transforms (samples, 6, 4, 4) of a loop at the samples."""
+def _numeric_transforms(problem: Problem, ring: Ring, length: float) -> Array:
+    """Return the transforms (samples, 6, 4, 4) of a loop at the samples, in units of `length`."""
     gaps = (*ring.gaps[1:], ring.gaps[0])
     stacked = problem.at_samples(SX(casadi.vertcat(*(gap.pose.matrix for gap in gaps))))
-    ways = np.array(stacked).reshape(len(stacked), 6, 4, 4)
-    ways[..., :3, 3] /= length
-    return ways
+    transforms = np.array(stacked).reshape(len(stacked), 6, 4, 4)
+    transforms[..., :3, 3] /= length
+    return transforms
 
 
 def _characteristic(problem: Problem, loop: _Loop) -> Characteristic:
-    """Return the matrix whose determinant vanishes at the positions of joint 3."""
+    """Return the matrix of a loop whose determinant vanishes at the positions of joint 3."""
     elimination, joint = loop.pencil.elimination, loop.ring.joints[2]
-    A = table(elimination, loop.ways)
+    A = table(elimination, loop.transforms)
     columns = len(elimination.first) * len(elimination.second) - 1
     E, values = eliminated(A, np.array(problem.at_samples(A)), columns, loop.pencil.rank)
     count = len(elimination.third)
     parts = [dialytic(elimination, part) for part in casadi.horzsplit(E, E.size2() // count)]
     numbers = elimination.dialytic(np.stack(np.split(values, count, axis=-1), axis=1))
-    rows = independent_rows(_spread(numbers), elimination.size)
+    rows = independent_rows(_at_three_angles(numbers), elimination.size)
     return Characteristic(
-        _in_joint([part[rows, :] for part in parts], loop),
+        _in_joint_functions([part[rows, :] for part in parts], loop),
         joint.name,
-        _place(joint),
+        _unknown_index(joint),
         not joint.is_rotational,
         regularity(numbers[:, :, rows]),
     )
 
 
-def _spread(parts: Array) -> Array:
-    """Return the matrices at three angles, for each sample."""
+def _at_three_angles(parts: Array) -> Array:
+    """Return the matrices of parts (samples, n3, n, n) at three angles for each sample."""
     count = len(_ANGLES)
     return at(np.repeat(parts, count, axis=0), np.tile(np.array(_ANGLES), len(parts)))
 
 
-def _in_joint(parts: list[SX], loop: _Loop) -> tuple[SX, ...]:
-    """Return the parts with 1, cos q, sin q, or with the powers of r in metres."""
+def _in_joint_functions(parts: list[SX], loop: _Loop) -> tuple[SX, ...]:
+    """Return the parts as factors of 1, cos q, sin q, or of the powers of r in metres."""
     joint = loop.ring.joints[2]
     if joint.is_rotational:
         return parts[0], parts[1], joint.sign * parts[2]
@@ -316,7 +343,7 @@ def _in_joint(parts: list[SX], loop: _Loop) -> tuple[SX, ...]:
     return tuple((joint.sign / loop.length) ** k * part for k, part in enumerate(parts))
 
 
-def _place(joint: ChainJoint) -> int:
+def _unknown_index(joint: ChainJoint) -> int:
     """Return the index of a joint among the unknowns. Raise NoClosedForm if it has none."""
     if joint.index is None:
         raise NoClosedForm(f"joint {joint.name} has no place among the unknowns of the problem")

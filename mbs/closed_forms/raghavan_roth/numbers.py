@@ -7,107 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mbs.closed_forms.arm import Arm, Field, inverse, motion
+from mbs.closed_forms.arm import Arm, inverse, motion
+from mbs.closed_forms.displacement_matrices import (
+    LINEAR,
+    SIZE,
+    Array,
+    back_parts,
+    frame_products,
+    half_parts,
+    motion_parts,
+    rho,
+)
 from mbs.errors import ModelError
 from mbs.numbers import NONZERO
-
-# A point p and a direction l as fifteen numbers w, which each rigid displacement maps linearly.
-#
-# w(p, l) = (1, p.p, p.l, p, l, p x l, p.p l - 2 (p.l) p). A displacement D maps p to R p + t and
-# l to R l. Then w(D p, D l) = rho(D) w(p, l), with rho(D D') = rho(D) rho(D').
-#
-# Source: Raghavan & Roth 1993, the fourteen equations; here as a representation of the group.
-
-
-Array = NDArray[np.float64]
-
-SIZE = 15
-
-#: Indices of the elements without p.p and p.p l - 2 (p.l) p, in which a displacement r appears
-# without r^2.
-LINEAR = np.array([0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11])
-
-
-def _skew(t: Array) -> Array:
-    """Return the matrix (3, 3) of the cross product with t (3,)."""
-    return np.array([[0, -t[2], t[1]], [t[2], 0, -t[0]], [-t[1], t[0], 0]])
-
-
-def _slope(t: Array) -> Array:
-    """Return the derivative (15, 15) of rho along a translation t."""
-    X = np.zeros((SIZE, SIZE))
-    X[1, 3:6] = 2 * t
-    X[2, 6:9] = t
-    X[3:6, 0] = t
-    X[9:12, 6:9] = _skew(t)
-    X[12:15, 9:12] = -2 * _skew(t)
-    X[12:15, 2] = -2 * t
-    return X
-
-
-def _turning() -> Array:
-    """Return parts (3, 15, 15) of rho of a rotation about z: constant, cosine and sine."""
-    Z = np.zeros((3, SIZE, SIZE))
-    Z[0, range(3), range(3)] = 1.0
-    for k in (3, 6, 9, 12):
-        Z[0, k + 2, k + 2] = Z[1, k, k] = Z[1, k + 1, k + 1] = Z[2, k + 1, k] = 1.0
-        Z[2, k, k + 1] = -1.0
-    return Z
-
-
-#: (3, 15, 15) derivatives X of rho along x, y, z. For a translation, rho is 1 + X + X X / 2.
-SLOPES = np.array([_slope(axis) for axis in np.eye(3)])
-#: (3, 15, 15) parts of rho of a rotation q about z, with 1, cos q, sin q.
-TURN = _turning()
-#: (3, 15, 15) parts of rho of a displacement r along z, with 1, r, r^2.
-SLIDE = np.array([np.eye(SIZE), SLOPES[2], 0.5 * SLOPES[2] @ SLOPES[2]])
-
-#: (6,) indices of the elements that are invariant under a rotation about z, and (6,) of elements
-# that are invariant under a translation along z.
-KEPT_BY_TURN = np.array([1, 2, 5, 8, 11, 14])
-KEPT_BY_SLIDE = np.array([3, 4, 6, 7, 8, 11])
-
-
-def pair(T: Field) -> Field:
-    """Return w (..., 15) of the origin and the z axis of frames T (..., 4, 4)."""
-    p, z = T[..., :3, 3], T[..., :3, 2]
-    pp, pz = np.sum(p * p, axis=-1)[..., None], np.sum(p * z, axis=-1)[..., None]
-    bent = pp * z - 2 * pz * p
-    return np.concatenate([np.ones_like(pp), pp, pz, p, z, np.cross(p, z), bent], axis=-1)
-
-
-def rho(T: Array) -> Array:
-    """Return matrices (..., 15, 15) of displacements T (..., 4, 4) that act on w; see `pair`."""
-    X = np.tensordot(T[..., :3, 3], SLOPES, axes=1)
-    turned = np.zeros((*T.shape[:-2], SIZE, SIZE), T.dtype)
-    turned[..., range(3), range(3)] = 1.0
-    for k in (3, 6, 9, 12):
-        turned[..., k : k + 3, k : k + 3] = T[..., :3, :3]
-    moved: Array = (np.eye(SIZE) + X + 0.5 * X @ X) @ turned
-    return moved
-
-
-def motion_parts(prismatic: bool) -> Array:
-    """Return parts (3, 15, 15) of rho of a joint, with 1, cos q, sin q or with 1, r, r^2."""
-    return SLIDE if prismatic else TURN
-
-
-def back_parts(prismatic: bool) -> Array:
-    """Return parts (3, 15, 15) of rho of the inverse motion of a joint, as in `motion_parts`."""
-    signs = np.array([1.0, -1.0, 1.0] if prismatic else [1.0, 1.0, -1.0])
-    back: Array = signs[:, None, None] * motion_parts(prismatic)
-    return back
-
-
-def half_parts(prismatic: bool) -> Array:
-    """Return parts (3, 15, 15) of rho of a joint with 1, x, x^2: (1 + x^2) rho for a rotation.
-
-    The variable x is tan(q/2) for a rotation, and the displacement r for a translation.
-    """
-    if prismatic:
-        return SLIDE
-    return np.array([TURN[0] + TURN[1], 2 * TURN[2], TURN[0] - TURN[1]])
-
 
 # Equations of a loop in three of its joints, and the matrix that is singular at a solution.
 #
@@ -164,33 +76,47 @@ class Elimination:
         """Size of the square matrix: number of monomials."""
         return self.grid[0] * self.grid[1]
 
-    def right_side(self, ways: Array) -> Array:
+    def right_side(self, transforms: Array) -> Array:
         """Return coefficients (N, s - 1, n1 n2) of the monomials of joints 1 and 2, 1 as the first.
 
         Args:
-            ways: (N, 6, 4, 4) constant transforms of the loop.
+            transforms: (N, 6, 4, 4) constant transforms of the loop.
         """
-        u = pair(inverse(ways[:, 5]))[:, self.elements]
-        once = self._carry(inverse(ways[:, 0]), np.einsum("jab,nb->naj", self.first, u))
+        u = frame_products(inverse(transforms[:, 5]))[:, self.elements]
+        once = self._carry(inverse(transforms[:, 0]), np.einsum("jab,nb->naj", self.first, u))
         twice = np.einsum("iab,nbj->naij", self.second, once)
-        return self._carry(inverse(ways[:, 1]), twice.reshape(*u.shape, -1))[:, 1:]
+        return self._carry(inverse(transforms[:, 1]), twice.reshape(*u.shape, -1))[:, 1:]
 
-    def left_side(self, ways: Array) -> Array:
-        """Return coefficients (N, n3, s - 1, n4 n5) of x4^i x5^j, for each weight of joint 3."""
-        w = pair(ways[:, 4])[:, self.elements]
-        once = self._carry(ways[:, 3], np.einsum("jab,nb->naj", self.fifth, w))
+    def left_side(self, transforms: Array) -> Array:
+        """Return coefficients (N, n3, s - 1, n4 n5) of x4^i x5^j, for each weight of joint 3.
+
+        Args:
+            transforms: (N, 6, 4, 4) constant transforms of the loop.
+        """
+        w = frame_products(transforms[:, 4])[:, self.elements]
+        once = self._carry(transforms[:, 3], np.einsum("jab,nb->naj", self.fifth, w))
         twice = np.einsum("iab,nbj->naij", self.fourth, once)
-        twice = self._carry(ways[:, 2], twice.reshape(*w.shape, -1))
+        twice = self._carry(transforms[:, 2], twice.reshape(*w.shape, -1))
         left: Array = np.einsum("kab,nbm->nkam", self.third, twice)[:, :, 1:]
         return left
 
     def equations(self, rows: Array, right: Array, left: Array) -> Array:
-        """Return equations (N, n3, k, n4 n5) in joints 3, 4, 5 from null rows (N, k, s - 1)."""
+        """Return the equations (N, n3, k, n4 n5) in joints 3, 4, 5, without joints 1 and 2.
+
+        Args:
+            rows: (N, k, s - 1) null rows of the factors of joints 1 and 2.
+            right: result of `right_side`.
+            left: result of `left_side`.
+        """
         constant = rows @ right[:, :, :1]
         return rows[:, None] @ left - constant[:, None] * self.one[:, None, :]
 
     def dialytic(self, E: Array) -> Array:
-        """Return the equations and their products by x4 or x5, (N, n3, 2 k, size)."""
+        """Return the equations and their products by x4 or x5, (N, n3, 2 k, size).
+
+        Args:
+            E: (N, n3, k, n4 n5) equations.
+        """
         count = E.shape[2]
         M = np.zeros((*E.shape[:2], 2 * count, *self.grid))
         E = E.reshape(*E.shape[:3], len(self.fourth), len(self.fifth))
@@ -200,15 +126,23 @@ class Elimination:
         return M.reshape(*M.shape[:3], -1)
 
     def _carry(self, T: Array, columns: Array) -> Array:
+        """Return the used elements of columns of w after displacements T (N, 4, 4).
+
+        w are the 15 products of `frame_products`; `columns` has them in its rows.
+        """
         moved: Array = rho(T)[:, self.elements[:, None], self.elements] @ columns
         return moved
 
 
 def weights(u: Array, count: int) -> Array:
-    """Return weights (N, count) of joint 3 at angles u (N,).
+    """Return the weights (N, count) of the parts of joint 3 at its angle.
 
     They are 1, cos u, sin u, or cos(u/2), sin(u/2) for count 2. A revolute joint is at u, a
     prismatic joint at r = tan(u/2).
+
+    Args:
+        u: (N,) angles [rad].
+        count: number of parts, 2 or 3.
     """
     if count == 2:
         return np.stack([np.cos(u / 2), np.sin(u / 2)], axis=-1)
@@ -216,31 +150,48 @@ def weights(u: Array, count: int) -> Array:
 
 
 def at(M: Array, u: Array) -> Array:
-    """Return the matrices at angles u (N,), from their parts (N, n3, n, n)."""
+    """Return the matrices (N, n, n) at angles of joint 3.
+
+    Args:
+        M: (N, n3, n, n) parts of the matrices.
+        u: (N,) angles [rad].
+    """
     value: Array = np.einsum("nk,nkab->nab", weights(u, M.shape[1]), M)
     return value
 
 
 def null_rows(right: Array, rank: int) -> Array:
-    """Return orthonormal rows (N, s - 1 - rank, s - 1) that cancel the monomials of joints 1, 2."""
+    """Return orthonormal rows (N, s - 1 - rank, s - 1) that cancel the monomials of joints 1 and 2.
+
+    Args:
+        right: result of `Elimination.right_side`.
+        rank: rank of its columns after the first.
+    """
     U = np.linalg.svd(right[:, :, 1:])[0]
     return np.swapaxes(U[:, :, rank:], -1, -2)
 
 
 def eliminations(prismatic: Joints) -> list[Elimination]:
-    """Return all eliminations: products by x4 or x5, and fewer equations with prismatic joints."""
+    """Return all eliminations: products by x4 or x5, and fewer equations with prismatic joints.
+
+    Args:
+        prismatic: (6,) whether each joint of the loop is prismatic.
+    """
     chosen = [np.arange(SIZE)] + ([LINEAR] if np.any(prismatic) else [])
     return [_elimination(prismatic, elements, k) for elements in chosen for k in (0, 1)]
 
 
 def _elimination(prismatic: Joints, elements: NDArray[np.int64], raised: int) -> Elimination:
-    """Return the tables of an elimination for the types of the joints."""
+    """Return the elimination with `elements` of w; `raised`: 0 for products by x4, 1 by x5.
+
+    w are the 15 products of `frame_products`; x4 and x5 are half-angle tangents of joints 4 and 5.
+    """
     slides = [bool(joint) for joint in prismatic]
     highest = 3 if len(elements) == SIZE else 2
     counts = [highest if slide else 3 for slide in slides]
     first, second = (back_parts(slides[k])[: counts[k]] for k in (0, 1))
     fourth, fifth = (half_parts(slides[k])[: counts[k]] for k in (3, 4))
-    third, unit = _third(slides[2], counts[2])
+    third, unit = _joint_3_parts(slides[2], counts[2])
     ends = (np.array([1.0, 0.0, 0.0 if slides[k] else 1.0])[: counts[k]] for k in (3, 4))
     one = np.einsum("k,i,j->kij", unit, *ends).reshape(len(unit), -1)
     own = (slice(None), elements[:, None], elements)
@@ -257,8 +208,8 @@ def _elimination(prismatic: Joints, elements: NDArray[np.int64], raised: int) ->
     )
 
 
-def _third(slides: bool, count: int) -> tuple[Array, Array]:
-    """Return the parts of joint 3 for its `weights`, and the coefficients of the number 1."""
+def _joint_3_parts(slides: bool, count: int) -> tuple[Array, Array]:
+    """Return first `count` parts of joint 3 for its `weights`, and coefficients of the number 1."""
     parts = motion_parts(slides)[:count]
     if not slides:
         return parts, np.array([1.0, 0.0, 0.0])
@@ -299,7 +250,7 @@ def middle_joints(M: Array, grid: tuple[int, int], count: int) -> tuple[Array, A
 
 
 def _shift(low: Array, high: Array) -> Array:
-    """Return the least-squares solutions X (n, m, m) of high = low X."""
+    """Return the least-squares solutions X (N, m, m) of high = low X."""
     count = low.shape[-1]
     low, high = (part.reshape(len(low), -1, count) for part in (low, high))
     # directions with singular values of rounding, about 1e-15, give no shift
@@ -307,7 +258,7 @@ def _shift(low: Array, high: Array) -> Array:
 
 
 def _rayleigh(vectors: Array, X: Array) -> Array:
-    """Return Rayleigh quotients (n, m) of X for vectors in columns; real parts if X is real."""
+    """Return Rayleigh quotients (N, m) of X (N, m, m) for vectors in columns; real if X is real."""
     size = np.sum(np.abs(vectors) ** 2, axis=1)
     values: Array = np.sum(np.conj(vectors) * (X @ vectors), axis=1) / size
     return np.real(values) if np.isrealobj(X) else values
@@ -331,7 +282,7 @@ class Arrangement:
         sign: +1, or -1 if the loop runs against the arm.
         prismatic: (6,) whether each joint of the loop is prismatic.
         offsets: (6,) angles at which the loop's joints are zero [rad]; 0 for prismatic joints.
-        ways: (6, 4, 4) constant transforms. The transform at `index` ends where the pose begins.
+        transforms: (6, 4, 4) constant transforms; that at `index` ends where the pose begins.
         index: index of the transform with the pose.
         after: (4, 4) transform after the pose in that transform.
         length: unit of lengths [m].
@@ -341,24 +292,29 @@ class Arrangement:
     sign: int
     prismatic: NDArray[np.bool_]
     offsets: Array
-    ways: Array
+    transforms: Array
     index: int
     after: Array
     length: float
 
-    def all_ways(self, T: Array) -> Array:
-        """Return the transforms (N, 6, 4, 4) of the loop for target poses T (N, 4, 4) [m]."""
-        T = _scale(T, self.length)
-        ways = np.broadcast_to(self.ways, (len(T), 6, 4, 4)).copy()
-        ways[:, self.index] = ways[:, self.index] @ self._pose(T) @ self.after
-        return ways
+    def transforms_for(self, T: Array) -> Array:
+        """Return the transforms (N, 6, 4, 4) of the loop for target poses.
 
-    def _pose(self, T: Array) -> Array:
-        """Return the pose T (..., 4, 4), inverted if the loop runs along the arm."""
-        return inverse(T) if self.sign > 0 else T
+        Args:
+            T: (N, 4, 4) target poses [m].
+        """
+        T = _scale(T, self.length)
+        pose = inverse(T) if self.sign > 0 else T
+        transforms = np.broadcast_to(self.transforms, (len(T), 6, 4, 4)).copy()
+        transforms[:, self.index] = transforms[:, self.index] @ pose @ self.after
+        return transforms
 
     def configurations(self, u: Array) -> Array:
-        """Return arm configurations (..., 6), angles in [-pi, pi), for loop joints at u."""
+        """Return arm configurations (..., 6) [rad or m], with angles in [-pi, pi).
+
+        Args:
+            u: (..., 6) positions of the joints of the loop.
+        """
         u = self.sign * (u + self.offsets)
         wrapped = (u + np.pi) % (2 * np.pi) - np.pi
         q = np.empty_like(u)
@@ -376,7 +332,7 @@ def arrangements(arm: Arm, offsets: Array) -> list[Arrangement]:
     length = loop_length(arm)
     G = _scale(arm.gaps, length)
     back = inverse(G)
-    ways = {1: np.array([*G[1:6], G[6]]), -1: np.array([*back[5:0:-1], back[0]])}
+    transforms = {1: np.array([*G[1:6], G[6]]), -1: np.array([*back[5:0:-1], back[0]])}
     after = {1: G[0], -1: back[6]}
     found = []
     for sign in (1, -1):
@@ -386,7 +342,7 @@ def arrangements(arm: Arm, offsets: Array) -> list[Arrangement]:
             if prismatic[5]:
                 continue
             own = np.where(prismatic, 0.0, offsets)
-            C = motion(own, prismatic=False) @ np.roll(ways[sign], -first, axis=0)
+            C = motion(own, prismatic=False) @ np.roll(transforms[sign], -first, axis=0)
             found.append(
                 Arrangement(order, sign, prismatic, own, C, 5 - first, after[sign], length)
             )
@@ -394,7 +350,11 @@ def arrangements(arm: Arm, offsets: Array) -> list[Arrangement]:
 
 
 def loop_length(arm: Arm) -> float:
-    """Return a typical length of an arm [m] that does not depend on its base and tool."""
+    """Return a typical length of an arm [m] that does not depend on its base and tool.
+
+    Args:
+        arm: arm of six joints.
+    """
     inner = float(np.sum(np.linalg.norm(arm.gaps[1:6, :3, 3], axis=1)))
     return inner if inner > _TINY_LENGTH * arm.length else arm.length
 
@@ -444,32 +404,33 @@ class Pencil:
         spare = min(float(rows / size) ** 12, _SPARE)
         return self.regularity * spare * (_SLIDING if self.elimination.slides else 1.0)
 
-    def matrices(self, ways: Array) -> Array:
+    def matrices(self, transforms: Array) -> Array:
         """Return parts (N, n3, n, n) of the matrix that is singular at the solutions.
 
         Args:
-            ways: (N, 6, 4, 4) constant transforms of the loop.
+            transforms: (N, 6, 4, 4) constant transforms of the loop.
         """
-        right, left = self.elimination.right_side(ways), self.elimination.left_side(ways)
+        right = self.elimination.right_side(transforms)
+        left = self.elimination.left_side(transforms)
         E = self.elimination.equations(null_rows(right, self.rank), right, left)
         M: Array = self.mix @ self.elimination.dialytic(E)
         return M
 
 
-def pencil(elimination: Elimination, ways: Array) -> Pencil:
+def pencil(elimination: Elimination, transforms: Array) -> Pencil:
     """Return the matrix construction of an elimination, with its rank and regularity.
 
     Args:
         elimination: elimination of joints 1 and 2.
-        ways: (N, 6, 4, 4) transforms of the loop at generic reachable poses.
+        transforms: (N, 6, 4, 4) transforms of the loop at generic reachable poses.
     """
-    s = np.linalg.svd(elimination.right_side(ways)[:, :, 1:], compute_uv=False)
+    s = np.linalg.svd(elimination.right_side(transforms)[:, :, 1:], compute_uv=False)
     rank = int(np.max(np.sum(s > _RANK * s[:, :1], axis=1)))
     rows, size = 2 * (len(elimination.elements) - 1 - rank), elimination.size
     if rows < size:
         return Pencil(elimination, rank, np.zeros((size, rows)), 0.0)
-    found = Pencil(elimination, rank, _mix(size, rows), 0.0)
-    return replace(found, regularity=regularity(found.matrices(ways)))
+    found = Pencil(elimination, rank, _random_rows(size, rows), 0.0)
+    return replace(found, regularity=regularity(found.matrices(transforms)))
 
 
 def regularity(M: Array) -> float:
@@ -488,8 +449,8 @@ def regularity(M: Array) -> float:
     return float(np.min(np.median(conditions, axis=1)))
 
 
-def _mix(size: int, rows: int) -> Array:
-    """Return orthonormal rows (size, rows); the identity if size and rows are equal."""
+def _random_rows(size: int, rows: int) -> Array:
+    """Return orthonormal rows (size, rows), random unless size and rows are equal."""
     if rows == size:
         return np.eye(size)
     columns = np.random.default_rng(_SEED).standard_normal((rows, size))
@@ -559,9 +520,9 @@ def prepare(arm: Arm) -> Prepared:
             f"arm {' '.join(arm.names)}: the general inverse geometric model is for six joints of"
             " which one is revolute at least; use method='search'"
         )
-    T = _reached(arm)
+    T = _generic_poses(arm)
     tried = [
-        Prepared(loop, pencil(elimination, loop.all_ways(T)))
+        Prepared(loop, pencil(elimination, loop.transforms_for(T)))
         for loop in arrangements(arm, _TRIAL_OFFSETS)
         for elimination in eliminations(loop.prismatic)
     ]
@@ -575,16 +536,19 @@ def prepare(arm: Arm) -> Prepared:
 
 
 def _eliminated(prepared: Prepared) -> frozenset[int]:
-    """Return the indices of the two arm joints that are eliminated first."""
+    """Return the indices of the two joints of the arm that are eliminated first."""
     return frozenset(prepared.arrangement.order[:2].tolist())
 
 
 def for_poses(prepared: Prepared, T: Array) -> list[tuple[Prepared, Numbers]]:
-    """Return the loops whose matrices are regular at poses, and the indices of these poses.
+    """Return, for each pose, the prepared loop whose matrix is regular there.
 
     Args:
         prepared: arm from `prepare`.
         T: (N, 4, 4) target poses [m].
+
+    Returns:
+        Pairs of a loop and the indices of its poses.
     """
     best, most = np.zeros(len(T), dtype=np.int64), np.full(len(T), -1.0)
     every = (prepared, *prepared.others)
@@ -592,14 +556,14 @@ def for_poses(prepared: Prepared, T: Array) -> list[tuple[Prepared, Numbers]]:
         left = np.flatnonzero(most <= _LEAST)
         if not len(left):
             break
-        found = _regularities(one.pencil.matrices(one.arrangement.all_ways(T[left])))
+        found = _regularities(one.pencil.matrices(one.arrangement.transforms_for(T[left])))
         better = found > most[left]
         best[left[better]], most[left[better]] = k, found[better]
     return [(every[k], np.flatnonzero(best == k)) for k in np.unique(best)]
 
 
-def _reached(arm: Arm) -> Array:
-    """Return poses (2, 4, 4) of generic configurations."""
+def _generic_poses(arm: Arm) -> Array:
+    """Return poses (2, 4, 4) of generic configurations of an arm [m]."""
     rng = np.random.default_rng(_PREPARE_SEED)
     turns = rng.uniform(-np.pi, np.pi, (_POSES, 6))
     # displacements of the size of the arm and not near zero, where axes might intersect
@@ -617,11 +581,14 @@ _ROUNDING = 1e-16  # lower limit of singular values that divide, relative to the
 
 
 def complex_roots(M: Array) -> NDArray[np.complex128]:
-    """Return complex angles u (N, r) at which the matrices (N, n3, n, n) are singular.
+    """Return complex angles u (N, r) [rad] at which matrices are singular.
 
     Some angles with a large imaginary part belong to no configuration.
+
+    Args:
+        M: (N, n3, n, n) parts of the matrices.
     """
-    offset, coefficients = _rotate(M / np.max(np.abs(M), axis=(1, 2, 3), keepdims=True))
+    offset, coefficients = _rotated_polynomial(M / np.max(np.abs(M), axis=(1, 2, 3), keepdims=True))
     x = np.linalg.eigvals(_companion(coefficients)).astype(complex)
     top, bottom = 1 + 1j * x, 1 - 1j * x
     size = np.log(np.abs(top) + NONZERO) - np.log(np.abs(bottom) + NONZERO)
@@ -631,7 +598,10 @@ def complex_roots(M: Array) -> NDArray[np.complex128]:
 
 
 def _companion(coefficients: Array) -> Array:
-    """Return companion matrices (N, d n, d n) of matrix polynomials in x of degree d."""
+    """Return the companion matrices (N, d n, d n) of matrix polynomials of degree d.
+
+    `coefficients` (N, d + 1, n, n) are in ascending order.
+    """
     count, degree, n = len(coefficients), coefficients.shape[1] - 1, coefficients.shape[-1]
     companion = np.zeros((count, degree * n, degree * n))
     companion[:, range((degree - 1) * n), range(n, degree * n)] = 1.0
@@ -643,7 +613,10 @@ def _companion(coefficients: Array) -> Array:
 
 
 def _far_regularities(M: Array) -> Array:
-    """Return reciprocal condition numbers (N, 8) of matrices at x = infinity, for each offset."""
+    """Return reciprocal condition numbers (N, 8) of matrices at x = infinity, for each offset.
+
+    M (N, n3, n, n) are the parts of the matrices.
+    """
     far = np.einsum("ok,nkab->noab", weights(_OFFSETS + np.pi, M.shape[1]), M)
     values = np.linalg.svd(far, compute_uv=False)
     conditions: Array = values[..., -1] / np.maximum(values[..., 0], NONZERO)
@@ -651,12 +624,15 @@ def _far_regularities(M: Array) -> Array:
 
 
 def _regularities(M: Array) -> Array:
-    """Return regularities (N,) of matrices (N, n3, n, n): the best over the offsets."""
+    """Return best reciprocal condition numbers (N,) over the offsets, for parts (N, n3, n, n).
+
+    M are the parts of the matrix of joint 3.
+    """
     most: Array = np.max(_far_regularities(M), axis=1)
     return most
 
 
-def _rotate(M: Array) -> tuple[Array, Array]:
+def _rotated_polynomial(M: Array) -> tuple[Array, Array]:
     """Return offsets (N,) and coefficients (N, d + 1, n, n) of 1, x, .. for u = offset + 2 atan x.
 
     The offset is the one of eight at which the last coefficient, the matrix at x = infinity, is

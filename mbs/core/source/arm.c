@@ -66,7 +66,7 @@ static void rotation_between(const double *target, const double *T, double *rota
     vector[2] = R[1][0] - R[0][1];
     s = 0.5 * sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
     if (s <= 1e-9 && R[0][0] + R[1][1] + R[2][2] < 0.0) {
-        half_rotation_axis((const double(*)[3])R, rotation);
+        half_rotation_axis((const double (*)[3])R, rotation);
         for (i = 0; i < 3; i++) rotation[i] *= PI;
         return;
     }

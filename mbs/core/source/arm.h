@@ -12,7 +12,7 @@ typedef struct {
     int n;
     const double *gaps; /* (n + 1, 4, 4) constant transforms before, between and after joints */
     const unsigned char *prismatic; /* (n,) whether prismatic along z, else revolute about z */
-    double length;               /* typical length of the arm [m] */
+    double length;                  /* typical length of the arm [m] */
 } arm;
 
 /* Configuration, and its pose, displacement to the target and Jacobian. */

@@ -14,8 +14,7 @@
 EXPORT void mbs_polish(const arm *a, const double *target, long long stride, long long count,
                        double *q, double *residual) {
     long long i;
-    for (i = 0; i < count; i++)
-        residual[i] = arm_polish(a, target + i * stride, q + i * a->n);
+    for (i = 0; i < count; i++) residual[i] = arm_polish(a, target + i * stride, q + i * a->n);
 }
 
 /* Corrects x (count, n) with held (count, n) and value (count,), see arm_correct. */
@@ -60,8 +59,7 @@ EXPORT long long mbs_walk(const arm *a, const double *target, const double *tang
 
 /* Fills q (starts, n), residual and hits (starts,). Returns the number of configurations found. */
 EXPORT long long mbs_search(const arm *a, const double *target, long long starts,
-                            unsigned long long seed, double *q, double *residual,
-                            long long *hits) {
+                            unsigned long long seed, double *q, double *residual, long long *hits) {
     arm_configurations found = {q, residual, hits, 0};
     arm_search(a, target, starts, seed, &found);
     return found.count;
@@ -130,16 +128,17 @@ EXPORT int mbs_pose_work(long long *arguments, long long *results, long long *in
 EXPORT void mbs_singular(const arm *a, double bound, long long count, const double *q,
                          unsigned char *singular) {
     long long i;
-    for (i = 0; i < count; i++) singular[i] = (unsigned char)pose_is_singular(a, q + i * a->n, bound);
+    for (i = 0; i < count; i++)
+        singular[i] = (unsigned char)pose_is_singular(a, q + i * a->n, bound);
 }
 
 /* Exports pose_settle for an evaluated closed form. Returns POSE_CERTAIN or POSE_DOUBTFUL. */
-EXPORT int mbs_settle(const arm *a, const double *T, long long branches, double *q, double *residual,
-                      const double *real, const double *regular, double suspect, double nearly, double *number,
-                      long long *count) {
+EXPORT int mbs_settle(const arm *a, const double *T, long long branches, double *q,
+                      double *residual, const double *real, const double *regular, double suspect,
+                      double nearly, double *number, long long *count) {
     int doubtful = 0;
-    *count = pose_settle(a, T, branches, q, residual, real, regular, suspect, nearly,
-                         number, &doubtful);
+    *count =
+        pose_settle(a, T, branches, q, residual, real, regular, suspect, nearly, number, &doubtful);
     return doubtful ? POSE_DOUBTFUL : POSE_CERTAIN;
 }
 
@@ -147,8 +146,8 @@ EXPORT int mbs_settle(const arm *a, const double *T, long long branches, double 
 EXPORT int mbs_round(double *T) { return pose_round(T); }
 
 /* Moves x (count, n) to a sphere, see arm_reach_sphere. */
-EXPORT void mbs_reach_sphere(const arm *a, const double *target, const double *centre, double radius,
-                             long long count, double *x) {
+EXPORT void mbs_reach_sphere(const arm *a, const double *target, const double *centre,
+                             double radius, long long count, double *x) {
     long long i;
     for (i = 0; i < count; i++) arm_reach_sphere(a, target, centre, radius, x + i * a->n);
 }

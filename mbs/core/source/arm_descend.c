@@ -6,19 +6,20 @@
 #include "rigid.h"
 
 enum { STALLS = 3, ROWS = 7 + ARM_JOINTS };
-static const double SOLUTION = 1e-26;   /* largest cost of a solution, from rounding */
-static const double FINEST = 1e-31; /* cost below which nothing can be gained */
-static const double WEAK = 1e-8;    /* relative pivot of normal equations that is rounding */
-static const double LEAST = 1e-31;  /* smallest damping, so that no matrix is singular */
+static const double SOLUTION = 1e-26;  /* largest cost of a solution, from rounding */
+static const double FINEST = 1e-31;    /* cost below which nothing can be gained */
+static const double WEAK = 1e-8;       /* relative pivot of normal equations that is rounding */
+static const double LEAST = 1e-31;     /* smallest damping, so that no matrix is singular */
 static const double DEPENDENT = 1e-12; /* damping of singular values that are rounding */
 static const double ZERO = 2e-6;       /* damping along self-motions, accurate to the root of
                                           1e-12 */
 static const double LONGEST = 0.3;     /* longest step of the linear range [rad or arm lengths] */
 static const double DEPENDENT_THERE = 1e-10; /* DEPENDENT on a sphere, where motions meet */
-static const double STRAIGHT = 0.9;    /* cosine of 26 degrees, largest change of direction in a
-                                          step: curves hardly ever cross at smaller angles */
-static const double FINISHED = 1e-14;  /* step [rad or arm lengths] that is rounding */
-static const double SETTLED = 1e-12;   /* step [rad or arm lengths] slightly above rounding */
+/* Cosine of 26 degrees, largest change of direction in a step: curves hardly ever cross at smaller
+ * angles */
+static const double STRAIGHT = 0.9;
+static const double FINISHED = 1e-14; /* step [rad or arm lengths] that is rounding */
+static const double SETTLED = 1e-12;  /* step [rad or arm lengths] slightly above rounding */
 
 void configuration_copy(const arm *a, configuration *to, const configuration *from) {
     size_t n = (size_t)a->n;
@@ -168,7 +169,8 @@ void arm_reach_sphere(const arm *a, const double *target, const double *centre, 
 /* Unit vector `along` in the null space of p->J that is nearest to the unit vector `before`.
  * Returns the cosine between them. One damped projection keeps parts along singular values of a few
  * times ZERO; three projections remove them. */
-static double null_direction(const arm *a, const configuration *p, const double *before, double *along) {
+static double null_direction(const arm *a, const configuration *p, const double *before,
+                             double *along) {
     static const double none[6] = {0.0};
     double found[ARM_JOINTS], cosine = 0.0;
     int k, pass;

@@ -88,7 +88,7 @@ static void refine(const arm *a, const double *target, configuration *p) {
         if (!known) curvature(a, target, p, H);
         known = 1;
         if (shift > 1e6) return;
-        if (!newton_step((const double(*)[ARM_JOINTS])H, a->n, shift, g, dx)) {
+        if (!newton_step((const double (*)[ARM_JOINTS])H, a->n, shift, g, dx)) {
             for (k = 0; k < a->n; k++) next.q[k] = p->q[k] + arm_unit(a, k) * dx[k];
             arm_examine(a, target, &next);
             slope(a, &next, next_g);

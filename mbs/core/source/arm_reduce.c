@@ -42,8 +42,8 @@ static int step_from(const arm *a, const configuration *p, const arm_reduction *
     return most < CONVERGED && *longest < CONVERGED;
 }
 
-int arm_reduced(const arm *a, const double *target, const arm_reduction *r, const double *h, double *x,
-                double *g) {
+int arm_reduced(const arm *a, const double *target, const arm_reduction *r, const double *h,
+                double *x, double *g) {
     configuration p;
     double longest = 1.0;
     int i, k, step, found = 0, n = a->n, rank = n - r->corank;

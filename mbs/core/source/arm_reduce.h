@@ -18,7 +18,7 @@ typedef struct {
 
 /* Computes x (n,) for h (c,) and the residual g (6 - n + c,) of the remaining equations, by
  * Newton's method. Returns 0 if it does not converge. */
-int arm_reduced(const arm *a, const double *target, const arm_reduction *r, const double *h, double *x,
-                double *g);
+int arm_reduced(const arm *a, const double *target, const arm_reduction *r, const double *h,
+                double *x, double *g);
 
 #endif

@@ -4,8 +4,8 @@
 
 #include <Python.h>
 
-/* array_call((evaluate, checkout, release), (arg, res, iw, w), (ndarray, MaskedArray, empty), inputs,
- * outputs, finite, guard, guarded): see mbs.native.array_calls. */
+/* array_call((evaluate, checkout, release), (arg, res, iw, w), (ndarray, MaskedArray, empty),
+ * inputs, outputs, finite, guard, guarded): see mbs.native.array_calls. */
 PyObject *array_call_new(PyObject *module, PyObject *args);
 
 #endif

@@ -63,7 +63,8 @@ void dense_factorize(dense_qr *f) {
         double *v = f->A + k * m + k;
         exchange(f, k, longest(f, k));
         f->weight[k] = dense_reflection(v, m - k);
-        for (j = k + 1; j < f->columns; j++) dense_reflect(v, f->weight[k], m - k, f->A + j * m + k);
+        for (j = k + 1; j < f->columns; j++)
+            dense_reflect(v, f->weight[k], m - k, f->A + j * m + k);
     }
 }
 

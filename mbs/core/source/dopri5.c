@@ -1,5 +1,7 @@
 #include "dopri5.h"
 
+#include "finite.h"
+
 const double DOPRI5_C[7] = {0.0, 1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1.0, 1.0};
 const double DOPRI5_A[7][6] = {
     {0},
@@ -36,7 +38,7 @@ static int attempt(stepper *s, const double *x, double h) {
     for (k = 1; k < 7; k++) {
         double *y = k == 6 ? stepper_candidate(s) : stepper_trial(s);
         for (i = 0; i < s->n; i++) y[i] = x[i] + h * combine(s, DOPRI5_A[k], k, i);
-        if (!stepper_all_finite(y, s->n)) return STEPPER_NOT_FINITE;
+        if (!all_finite(y, s->n)) return STEPPER_NOT_FINITE;
         status = stepper_evaluate(s, t + DOPRI5_C[k] * h, y, stage(s, k));
         if (status) return status;
     }

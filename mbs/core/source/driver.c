@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "dopri5.h"
+#include "finite.h"
 #include "passage_start.h"
 #include "projection.h"
 #include "rodas.h"
@@ -88,12 +89,10 @@ static double *modes_of(const driver *d) { return d->p + d->model.n_p - d->model
 static int jump(void *user, double t, double *x, const double *fired) {
     driver *d = user;
     double *res[2];
-    int i;
     res[0] = d->projected;
     res[1] = d->modes;
     if (evaluate(d, &d->model.jump, t, x, fired, res)) return 1;
-    for (i = 0; i < d->model.n_modes; i++)
-        if (!isfinite(d->modes[i])) return 1;
+    if (!all_finite(d->modes, d->model.n_modes)) return 1;
     memcpy(x, d->projected, sizeof *x * (size_t)d->model.n);
     memcpy(modes_of(d), d->modes, sizeof *d->modes * (size_t)d->model.n_modes);
     return 0;

@@ -17,11 +17,11 @@ typedef struct {
     model_function jacobian; /* -> d rhs / d x (n, n), d rhs / d t; selects RODAS5P */
     model_function indicators, rates; /* -> (n_indicators,) values, and their rates of change */
     model_function approaches;        /* -> (n_indicators, 3), see events.h */
-    model_function jump;     /* with the fired indicators as input 4 -> x, modes (n_modes,) */
+    model_function jump; /* with the fired indicators as input 4 -> x, modes (n_modes,) */
     model_function rows, forces, regularity; /* see passage.h */
-    passage_size size;          /* dimensions of rows */
-    passage_patterns patterns;  /* sparsity patterns of the matrices of rows and forces */
-    double typical;             /* regularity at a common configuration */
+    passage_size size;                       /* dimensions of rows */
+    passage_patterns patterns; /* sparsity patterns of the matrices of rows and forces */
+    double typical;            /* regularity at a common configuration */
 } driver_model;
 
 typedef struct {
@@ -55,7 +55,7 @@ int driver_table(driver *d, double *x, const double *times, long count, double *
 int driver_leaves(driver *d, const double *x, double *slope);
 
 double driver_time(const driver *d);
-double driver_step(const driver *d);        /* the next step that error control requires [s] */
+double driver_step(const driver *d);         /* the next step that error control requires [s] */
 const double *driver_fired(const driver *d); /* (n_indicators,) 1 if fired last */
 const double *driver_modes(const driver *d); /* (n_modes,) present modes */
 

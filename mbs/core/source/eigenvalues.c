@@ -3,6 +3,8 @@
 #include <float.h>
 #include <math.h>
 
+#include "finite.h"
+
 enum { SWEEPS = 90, PATIENCE = 10 }; /* iterations: limit, interval of other shifts */
 
 static double off_diagonal_row(int n, const double *A, int i) {
@@ -24,13 +26,6 @@ static double norm(int n, const double *A) {
     int i;
     for (i = 0; i < n * n; i++) sum += A[i] * A[i];
     return sqrt(sum);
-}
-
-static int all_finite(int n, const double *A) {
-    int i;
-    for (i = 0; i < n * n; i++)
-        if (!(fabs(A[i]) <= DBL_MAX)) return 0;
-    return 1;
 }
 
 /* Scale A by a power of two to elements of at most 1. Returns the exponent. */
@@ -145,8 +140,8 @@ static int step_start(int n, const double *H, int first, int last, const shifts 
         double left, right;
         first_column(n, H, m, s, v);
         left = fabs(H[m * n + m - 1]) * (fabs(v[1]) + fabs(v[2]));
-        right = fabs(v[0]) * (fabs(H[(m - 1) * n + m - 1]) + fabs(H[m * n + m]) +
-                              fabs(H[(m + 1) * n + m + 1]));
+        right = fabs(v[0]) *
+                (fabs(H[(m - 1) * n + m - 1]) + fabs(H[m * n + m]) + fabs(H[(m + 1) * n + m + 1]));
         if (left < DBL_EPSILON * right) break;
     }
     return m;
@@ -228,7 +223,7 @@ static shifts shifts_of(int n, const double *row, int last, int sweeps) {
 int eigenvalues(int n, double *A, double *real, double *imaginary) {
     int k, exponent, last = n - 1, sweeps = 0;
     double size;
-    if (!all_finite(n, A)) return 1;
+    if (!all_finite(A, n * n)) return 1;
     exponent = scale_rows(n, A);
     balance(n, A);
     reduce_to_hessenberg(n, A);

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "finite.h"
+
 enum { LOOKS = 2, TANGENTS = 30, SECANTS = 20, MAX_JUMPS = 20, MAX_IDLE = 100 };
 
 static const double DEPARTURE = 1e-8; /* fraction of a step for a rising indicator to leave zero */
@@ -78,7 +80,7 @@ static int look(const events *e, const double *x, double t, double *values, doub
     if (status) return status;
     if (e->model->indicators(user, t, e->work, values)) return EVENTS_INDICATORS_FAILED;
     if (rates && e->model->rates(user, t, e->work, rates)) return EVENTS_INDICATORS_FAILED;
-    return stepper_all_finite(values, e->count) ? STEPPER_OK : EVENTS_INDICATORS_FAILED;
+    return all_finite(values, e->count) ? STEPPER_OK : EVENTS_INDICATORS_FAILED;
 }
 
 /* Smallest value of the indicators that can fire. */
@@ -260,7 +262,7 @@ static int may_repeat(const stepper *s, double start, double event) {
 /* Evaluate the approaches at the state of the last sample. */
 static int look_near(const events *e, double t, double *near) {
     if (e->model->approaches(e->solver->user, t, e->work, near)) return EVENTS_INDICATORS_FAILED;
-    return stepper_all_finite(near, 3 * e->count) ? STEPPER_OK : EVENTS_INDICATORS_FAILED;
+    return all_finite(near, 3 * e->count) ? STEPPER_OK : EVENTS_INDICATORS_FAILED;
 }
 
 /* Reciprocal time scale of indicator k, the larger value of both samples. */
@@ -360,8 +362,8 @@ static int first_event(events *e, const double *x, double start, double *event, 
         double next = number < LOOKS ? start + number * (end - start) / LOOKS : end;
         double to = near ? fmin(next, from + time_to_next(e)) : next;
         if (to <= from) to = next; /* the increment is below the rounding of time */
-        status = from > start ? look(e, x, to, right(e), right_rate(e))
-                              : first_look(e, x, start, &to);
+        status =
+            from > start ? look(e, x, to, right(e), right_rate(e)) : first_look(e, x, start, &to);
         if (near && !status) {
             status = come_near(e, x, from, &to);
             if (!status && !follows(e, start, to)) {
@@ -425,7 +427,7 @@ int events_step(events *e, double *x, double limit) {
 static int projected(events *e, double *x) {
     stepper *s = e->solver;
     if (!s->project) return STEPPER_OK;
-    if (s->project(s->user, stepper_time(s), x) || !stepper_all_finite(x, s->n))
+    if (s->project(s->user, stepper_time(s), x) || !all_finite(x, s->n))
         return STEPPER_PROJECTION_FAILED;
     return judge(e, x);
 }
@@ -439,7 +441,7 @@ int events_settle(events *e, double *x, double limit) {
     for (i = 0; events_pending(e); i++) {
         for (k = 0; k < e->count; k++) fired(e)[k] = fmax(fired(e)[k], due(e)[k]);
         if (i == MAX_JUMPS) return EVENTS_DO_NOT_SETTLE;
-        if (e->model->jump(s->user, t, x, due(e)) || !stepper_all_finite(x, s->n))
+        if (e->model->jump(s->user, t, x, due(e)) || !all_finite(x, s->n))
             return EVENTS_JUMP_FAILED;
         status = judge(e, x);
         if (!status && !events_pending(e)) status = projected(e, x);

@@ -4,15 +4,17 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "finite.h"
+
 /* Fraction of a squared column length below which the remaining square is summed again: four of its
  * sixteen digits are then lost by cancellation. */
 #define CANCELLED 1e-4
 /* Relative difference of lengths that count as equal: the first of equal columns is the pivot,
  * since rounding decides which of them is the longest. */
 #define EQUAL 1e-6
-#define STALLED 1e-14   /* length of a step [rad or m] that changes no digit that matters */
+#define STALLED 1e-14    /* length of a step [rad or m] that changes no digit that matters */
 #define LAST_DIGITS 1e-2 /* fraction of the tolerance above which another step is made */
-#define SHORTEST 1e-6   /* fraction of a step at which the halving ends */
+#define SHORTEST 1e-6    /* fraction of a step at which the halving ends */
 
 /* Sum a (n,) in the order of NumPy: eight partial sums, and by halves above 128 elements. */
 static double sum(const double *a, int n) {
@@ -29,8 +31,8 @@ static double sum(const double *a, int n) {
     for (j = 0; j < 8; j++) part[j] = a[j];
     for (i = 8; i < n - n % 8; i += 8)
         for (j = 0; j < 8; j++) part[j] += a[i + j];
-    total = ((part[0] + part[1]) + (part[2] + part[3])) +
-            ((part[4] + part[5]) + (part[6] + part[7]));
+    total =
+        ((part[0] + part[1]) + (part[2] + part[3])) + ((part[4] + part[5]) + (part[6] + part[7]));
     for (; i < n; i++) total += a[i];
     return total;
 }
@@ -69,8 +71,7 @@ static void reflect(double *W, int m, int n, int stride, double *v, int *rows, d
             v[count++] = v[i];
         }
     for (i = 0; i < count; i++)
-        for (j = 1; j < n; j++)
-            products[i * (n - 1) + j - 1] = v[i] * W[rows[i] * stride + j];
+        for (j = 1; j < n; j++) products[i * (n - 1) + j - 1] = v[i] * W[rows[i] * stride + j];
     column_sums(products, count, n - 1, sums);
     for (j = 0; j < n - 1; j++) sums[j] /= first * v[0];
     for (i = 0; i < count; i++)
@@ -160,7 +161,8 @@ static int factorized(space *w, int m, int n, double gap) {
     return steps;
 }
 
-static void solved(space *w, int m, int n, const double *A, const double *b, double gap, double *x) {
+static void solved(space *w, int m, int n, const double *A, const double *b, double gap,
+                   double *x) {
     int width = n + 1, height = 0, loose, rank, i, j, k;
     double *F = w->F, *u = w->v, *y = w->y;
     for (i = 0; i < m; i++) {
@@ -175,8 +177,7 @@ static void solved(space *w, int m, int n, const double *A, const double *b, dou
         double *row = w->W + k * width;
         for (j = rank; j < width; j++) row[j] /= row[k];
         for (i = 0; i < k; i++)
-            for (j = rank; j < width; j++)
-                w->W[i * width + j] -= w->W[i * width + k] * row[j];
+            for (j = rank; j < width; j++) w->W[i * width + j] -= w->W[i * width + k] * row[j];
     }
     for (i = 0; i < n; i++) {
         y[i] = i < rank ? w->W[i * width + n] : 0.0;
@@ -191,8 +192,7 @@ static void solved(space *w, int m, int n, const double *A, const double *b, dou
         size = pow(sum(w->products, n), 0.5);
         for (i = 0; i < n; i++) u[i] = F[i * loose + k] / size;
         for (i = 0; i < n; i++)
-            for (j = 0; j < rest; j++)
-                w->products[i * rest + j] = u[i] * F[i * loose + k + 1 + j];
+            for (j = 0; j < rest; j++) w->products[i * rest + j] = u[i] * F[i * loose + k + 1 + j];
         if (rest) column_sums(w->products, n, rest, w->sums);
         for (i = 0; i < n; i++)
             for (j = 0; j < rest; j++) F[i * loose + k + 1 + j] -= u[i] * w->sums[j];
@@ -209,13 +209,6 @@ int shortest_solution(int m, int n, const double *A, const double *b, double gap
     if (block) solved(&w, m, n, A, b, gap, x);
     free(block);
     return !block;
-}
-
-static int all_finite(const double *a, int n) {
-    int i;
-    for (i = 0; i < n; i++)
-        if (!isfinite(a[i])) return 0;
-    return 1;
 }
 
 /* Whether every residual is at most `part` times its tolerance. */

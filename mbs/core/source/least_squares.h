@@ -18,7 +18,7 @@ int shortest_solution(int m, int n, const double *A, const double *b, double gap
 /* Equations r(q, p) = 0 with some elements of q unknown. */
 typedef struct {
     int size, rows, unknowns, elements;
-    double *q, *r, *e;       /* (size,), (rows,), (elements,) */
+    double *q, *r, *e; /* (size,), (rows,), (elements,) */
     const double *p;
     const int *free;         /* (unknowns,) indices of the unknowns in q */
     const int *row, *column; /* (elements,) of the Jacobian; column of an unknown, or -1 */

@@ -8,9 +8,9 @@
 
 /* Return values of an evaluation. */
 enum {
-    MODEL_STOP = -1,    /* the integration must stop now, for example after control-C */
+    MODEL_STOP = -1, /* the integration must stop now, for example after control-C */
     MODEL_VALUES = 0,
-    MODEL_NO_VALUE = 1  /* the function has no value here: a shorter step may succeed */
+    MODEL_NO_VALUE = 1 /* the function has no value here: a shorter step may succeed */
 };
 
 /* Evaluate a function. arg: a pointer to each input. res: a pointer to each output, NULL for an

@@ -18,7 +18,7 @@ typedef struct {
     PyObject_HEAD
     model_function function;
     compiled_function compiled;
-    void *memory; /* of the compiled function */
+    void *memory;                     /* of the compiled function */
     PyObject *call, *examine, *owner; /* owner: keeps the memory of the function */
     Py_buffer *views; /* of the inputs, then of the outputs of an interpreted function */
     int inputs, outputs, opened;
@@ -194,7 +194,7 @@ static void integration_free(PyObject *self) {
     Py_DECREF(type);
 }
 
-/* The memory of an array, which stays open as long as the integration; NULL for None or an error. */
+/* Memory of an array, which stays open as long as the integration. NULL for None or an error. */
 static const void *memory_of(Integration *i, PyObject *array) {
     Py_buffer *view = &i->views[i->opened];
     if (array == Py_None || PyObject_GetBuffer(array, view, PyBUF_SIMPLE)) return NULL;
@@ -204,8 +204,8 @@ static const void *memory_of(Integration *i, PyObject *array) {
 
 static int take_functions(PyObject *module, driver_model *model, PyObject *functions) {
     model_function *const to[FUNCTIONS] = {
-        &model->rhs,   &model->project,    &model->jacobian, &model->indicators, &model->rates,
-        &model->jump,  &model->approaches, &model->rows,     &model->forces,     &model->regularity,
+        &model->rhs,  &model->project,    &model->jacobian, &model->indicators, &model->rates,
+        &model->jump, &model->approaches, &model->rows,     &model->forces,     &model->regularity,
     };
     int k;
     if (PyTuple_Size(functions) != FUNCTIONS) {
@@ -233,12 +233,13 @@ static int take_passage(Integration *i, PyObject *passage) {
     return PyErr_Occurred() != NULL;
 }
 
-static int take_control(Integration *i, driver_control *control, PyObject *factors,
-                        PyObject *stops, PyObject *jumps) {
+static int take_control(Integration *i, driver_control *control, PyObject *factors, PyObject *stops,
+                        PyObject *jumps) {
     control->absolute = memory_of(i, factors);
     if (control->absolute) control->relative = control->absolute + i->model.n;
     control->stops = memory_of(i, stops);
-    if (control->stops) control->n_stops = (long)(i->views[i->opened - 1].len / (Py_ssize_t)sizeof(double));
+    if (control->stops)
+        control->n_stops = (long)(i->views[i->opened - 1].len / (Py_ssize_t)sizeof(double));
     control->jumps = memory_of(i, jumps);
     return PyErr_Occurred() != NULL;
 }
@@ -256,9 +257,8 @@ static PyObject *integration(PyObject *module, PyObject *args) {
     m = &i->model;
     memset(&control, 0, sizeof control);
     if (!PyArg_ParseTuple(args, "O!(iiii)OO(dddd)O(OO)d", &PyTuple_Type, &functions, &m->n, &m->n_p,
-                          &m->n_modes, &m->n_indicators, &passage, &p, &control.rtol,
-                          &control.atol, &control.max_step, &control.first_step, &factors, &stops,
-                          &jumps, &t) ||
+                          &m->n_modes, &m->n_indicators, &passage, &p, &control.rtol, &control.atol,
+                          &control.max_step, &control.first_step, &factors, &stops, &jumps, &t) ||
         take_functions(module, m, functions) || take_passage(i, passage) ||
         !(parameters = memory_of(i, p)) || take_control(i, &control, factors, stops, jumps)) {
         Py_DECREF(i);
@@ -439,14 +439,16 @@ static PyMethodDef methods[] = {
     {"compiled", compiled, METH_VARARGS,
      "compiled(address, (inputs, outputs), (arg, res, iw, w)) -> Evaluation of machine code."},
     {"interpreted", interpreted, METH_VARARGS,
-     "interpreted(call, examine, owner, inputs, outputs) -> Evaluation of a bound casadi.Function."},
+     "interpreted(call, examine, owner, inputs, outputs) -> Evaluation of a bound"
+     " casadi.Function."},
     {"array_call", array_call_new, METH_VARARGS, "See mbs.native.array_calls.array_builtin."},
     {"shortest_solution", py_shortest_solution, METH_VARARGS,
      "shortest_solution(A, b, gap, x): see least_squares.h."},
     {"gauss_newton", py_gauss_newton, METH_VARARGS,
      "gauss_newton((equations, values, step), (q, p, r, e), (free, row, column, tolerance), gap,"
      " iterations) -> (status, residual): see least_squares.h."},
-    {"integration", integration, METH_VARARGS, "integration(functions, sizes, passage, p, tolerances, factors, (stops, jumps), t) ->"
+    {"integration", integration, METH_VARARGS,
+     "integration(functions, sizes, passage, p, tolerances, factors, (stops, jumps), t) ->"
      " Integration: see driver.h."},
     {NULL, NULL, 0, NULL},
 };
@@ -461,8 +463,15 @@ static int execute(PyObject *module) {
 
 static PyModuleDef_Slot slots[] = {{Py_mod_exec, execute}, {0, NULL}};
 static struct PyModuleDef definition = {
-    PyModuleDef_HEAD_INIT, "_core", "The run-time library of mbs.", sizeof(module_state),
-    methods, slots, NULL, NULL, NULL,
+    PyModuleDef_HEAD_INIT,
+    "_core",
+    "The run-time library of mbs.",
+    sizeof(module_state),
+    methods,
+    slots,
+    NULL,
+    NULL,
+    NULL,
 };
 
 PyMODINIT_FUNC PyInit__core(void);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "dense.h"
+#include "finite.h"
 #include "passage_frame.h"
 #include "passage_newton.h"
 #include "skyline.h"
@@ -224,5 +225,5 @@ int chart_state(passage *g, double t, const double *y, double *x, double *xdot, 
         return STEPPER_SINGULAR;
     acceleration_at(g, xdot + nq);
     slopes_at(g, y, x, xdot, ydot);
-    return stepper_all_finite(xdot, g->stepper->n) ? STEPPER_OK : STEPPER_SINGULAR;
+    return all_finite(xdot, g->stepper->n) ? STEPPER_OK : STEPPER_SINGULAR;
 }

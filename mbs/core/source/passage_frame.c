@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "finite.h"
 #include "skyline.h"
 
 int frame_rows(passage *g, double t, const double *x, const passage_rows *rows) {
@@ -20,8 +21,8 @@ int frame_evaluate(passage *g, passage_frame *p, double t, const double *x) {
         return 1;
     p->rank = (int)fmin(*p->rows.rank, fmin(g->size.nv, g->size.speeds));
     p->penalty = 0.0;
-    return !stepper_all_finite(p->inertia, g->patterns.M.start[g->size.nv]) ||
-           !stepper_all_finite(p->f, g->size.nv);
+    return !all_finite(p->inertia, g->patterns.M.start[g->size.nv]) ||
+           !all_finite(p->f, g->size.nv);
 }
 
 /* Write the elements of M over L, and the ends of its columns. */

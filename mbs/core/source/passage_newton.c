@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "dense.h"
+#include "finite.h"
 #include "passage_frame.h"
 
 /* Pivot of the Newton matrix that counts as zero, as a fraction of the largest pivot. It is ten
@@ -98,7 +99,7 @@ int newton_project(passage *g, double t, const double *xi, double *x, double *di
                     K[j * rows + g->patterns.slope.row[i]] = p->rows.slope[i];
         }
         add_coordinate_rows(g, xi, x, rows, K, r);
-        if (rows < nq || !stepper_all_finite(r, rows)) return 1;
+        if (rows < nq || !all_finite(r, rows)) return 1;
         if (rows == nq ? sparse_newton_step(g, p->rows.slope, K, r)
                        : least_squares_newton_step(g, rows, r))
             return 1;

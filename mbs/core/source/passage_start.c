@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "dense.h"
+#include "finite.h"
 #include "passage_chart.h"
 #include "passage_crossing.h"
 #include "passage_frame.h"
@@ -70,7 +71,7 @@ int passage_place(passage *g, double t, double *x, const int *loose, int count) 
                 int row = g->patterns.slope.row[j], free = row >= first && row < g->size.speeds;
                 if (!free) A[row * count + i] = g->point.rows.slope[j];
             }
-        if (!isfinite(worst) || !stepper_all_finite(A, m * count)) return 1;
+        if (!isfinite(worst) || !all_finite(A, m * count)) return 1;
         if (move < NEWTON_CONVERGED || pass == START_NEWTON_STEPS) break;
         minimum_norm_solution(g, count, m, r, DEPENDENT_POSITIONS, g->scratch.y);
         for (move = 0.0, i = 0; i < count; i++) {
@@ -95,7 +96,7 @@ int passage_velocities(passage *g, double t, double *x, const int *kept, int cou
             A[j * nv + g->patterns.J.column[i]] = g->point.rows.J[g->patterns.J.from[i]];
         if (j >= m) A[j * nv + kept[j - m]] = 1.0;
     }
-    if (!stepper_all_finite(A, (m + count) * nv)) return 1;
+    if (!all_finite(A, (m + count) * nv)) return 1;
     minimum_norm_solution(g, nv, m + count, r, DEPENDENT_VELOCITIES, y);
     for (i = 0; i < nv; i++) speed = fmax(speed, fabs(y[i]));
     for (j = 0; j < m + count; j++) {

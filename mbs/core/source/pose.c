@@ -6,14 +6,14 @@
 #include "dense.h"
 #include "rigid.h"
 
-static const double SKEWED = 1e-6;     /* largest error of an element of a rigid transform */
-static const double SOLVED = 1e-12;    /* largest residual of a solution, times max(1 m, length) */
-static const double EXACT = 1e-14;     /* residual that polishing hardly reduces, same unit */
-static const double DOUBTFUL = 1e-6;   /* residual with a solution possibly near, same unit */
-static const double FOLD = 1e-9;       /* negative radicand of a real root, from rounding */
+static const double SKEWED = 1e-6;      /* largest error of an element of a rigid transform */
+static const double SOLVED = 1e-12;     /* largest residual of a solution, times max(1 m, length) */
+static const double EXACT = 1e-14;      /* residual that polishing hardly reduces, same unit */
+static const double DOUBTFUL = 1e-6;    /* residual with a solution possibly near, same unit */
+static const double FOLD = 1e-9;        /* negative radicand of a real root, from rounding */
 static const double DEGENERATE = 1e-12; /* squared measure of a step that determines no joint */
-static const double EQUAL = 1e-9;      /* distance of equal configurations [rad or arm lengths] */
-static const double MEETING = 1e-5;    /* distance near a double root [rad or arm lengths] */
+static const double EQUAL = 1e-9;       /* distance of equal configurations [rad or arm lengths] */
+static const double MEETING = 1e-5;     /* distance near a double root [rad or arm lengths] */
 static const double FLAT_PIVOT = 1e-15; /* pivot of a Jacobian that is rounding */
 
 /* Source: Higham 2008, chapter 8, the Newton-Schulz iteration for the polar factor. */
@@ -112,8 +112,8 @@ static int is_certain(const arm *a, const double *T, const double *q, double nea
 }
 
 long long pose_settle(const arm *a, const double *T, long long branches, double *q,
-                      double *residual, const double *real, const double *regular,
-                      double suspect, double nearly, double *number, int *doubtful) {
+                      double *residual, const double *real, const double *regular, double suspect,
+                      double nearly, double *number, int *doubtful) {
     const double scale = fmax(1.0, a->length);
     const size_t bytes = (size_t)a->n * sizeof(double);
     long long b, i, count = 0;
@@ -127,7 +127,8 @@ long long pose_settle(const arm *a, const double *T, long long branches, double 
             residual[b] = arm_polish(a, T, own);
             near = 1;
         }
-        if (!(residual[b] <= SOLVED * scale && real[b] >= -FOLD && apart(a, before, own) <= MEETING)) {
+        if (!(residual[b] <= SOLVED * scale && real[b] >= -FOLD &&
+              apart(a, before, own) <= MEETING)) {
             *doubtful = 1;
             continue;
         }
@@ -168,8 +169,8 @@ static long long by_closed_form(const pose_solver *s, const double *T, double *q
     failed = s->evaluate(in, out, integers, reals, memory);
     if (s->release) s->release(memory);
     return failed ? -1
-                  : pose_settle(s->robot, T, branches, q, residual, real, real + branches, s->suspect,
-                                s->nearly, number, doubtful);
+                  : pose_settle(s->robot, T, branches, q, residual, real, real + branches,
+                                s->suspect, s->nearly, number, doubtful);
 }
 
 /* Solutions by the general method, in any order. Returns their number. */

@@ -22,7 +22,7 @@ typedef struct {
     void (*release)(int);
     long long branches;
     long long arguments, results, integers, reals; /* work sizes of the closed form */
-    double suspect, nearly; /* bounds, see pose_settle */
+    double suspect, nearly;                        /* bounds, see pose_settle */
     long long nq;
     const long long *indices; /* (n,) of the arm's joints in the coordinates; NULL: in order */
     const double *others;     /* (nq,) positions of all coordinates; arm joints unused */
@@ -39,8 +39,8 @@ int pose_is_singular(const arm *a, const double *q, double bound);
  * singular values of the Jacobian below `nearly`. The Jacobian is not examined for branches whose
  * `real` and `regular` are at least `suspect`. */
 long long pose_settle(const arm *a, const double *T, long long branches, double *q,
-                      double *residual, const double *real, const double *regular,
-                      double suspect, double nearly, double *number, int *doubtful);
+                      double *residual, const double *real, const double *regular, double suspect,
+                      double nearly, double *number, int *doubtful);
 
 /* Solves for a pose (4, 4), column by column: q (room, nq), residual (room,), branch number (room,)
  * and their count. Returns the result code. There must be room for all branches, or

@@ -13,29 +13,29 @@
 #include "arm_search.h"
 
 enum {
-    ROTH_SIZE = 12,      /* largest number of monomials x4^i x5^j */
-    ROTH_ROOTS = 24,     /* largest number of angles of joint 3 */
-    ROTH_SHARED = 6,     /* largest number of solutions that share an angle of joint 3 */
+    ROTH_SIZE = 12,            /* largest number of monomials x4^i x5^j */
+    ROTH_ROOTS = 24,           /* largest number of angles of joint 3 */
+    ROTH_SHARED = 6,           /* largest number of solutions that share an angle of joint 3 */
     ROTH_CONFIGURATIONS = 144, /* largest number of candidates */
-    ROTH_ROWS = 28       /* largest number of equations before they are mixed */
+    ROTH_ROWS = 28             /* largest number of equations before they are mixed */
 };
 
 typedef struct roth_loop {
-    int order[6];            /* index of the arm's joint for each joint of the loop */
-    int sign;                /* 1; -1 if the loop runs against the arm */
-    int prismatic[6];           /* whether each joint of the loop is prismatic */
-    double offsets[6];       /* angles at which the loop's joints are zero [rad] */
-    double transforms[6][16];      /* (4, 4), row by row, in arm lengths */
-    int index;               /* index of the transform that ends where the pose begins */
-    double after[16];        /* transform after the pose in that transform */
-    double length;           /* unit of lengths [m] */
-    int count;               /* number of used elements of w, see pair.h */
-    int elements[15];        /* indices of these elements; the first is the number 1 */
-    int powers[5];           /* numbers of monomials of joints 1 to 5 */
-    int raised;              /* 0: the equations are multiplied by x4; 1: by x5 */
-    int rank;                /* rank of the matrix of the monomials of joints 1 and 2 */
-    int size;                /* size of the square matrix */
-    const double *mix;       /* (size, rows) combinations of the equations; NULL: rows = size */
+    int order[6];             /* index of the arm's joint for each joint of the loop */
+    int sign;                 /* 1; -1 if the loop runs against the arm */
+    int prismatic[6];         /* whether each joint of the loop is prismatic */
+    double offsets[6];        /* angles at which the loop's joints are zero [rad] */
+    double transforms[6][16]; /* (4, 4), row by row, in arm lengths */
+    int index;                /* index of the transform that ends where the pose begins */
+    double after[16];         /* transform after the pose in that transform */
+    double length;            /* unit of lengths [m] */
+    int count;                /* number of used elements of w, see pair.h */
+    int elements[15];         /* indices of these elements; the first is the number 1 */
+    int powers[5];            /* numbers of monomials of joints 1 to 5 */
+    int raised;               /* 0: the equations are multiplied by x4; 1: by x5 */
+    int rank;                 /* rank of the matrix of the monomials of joints 1 and 2 */
+    int size;                 /* size of the square matrix */
+    const double *mix;        /* (size, rows) combinations of the equations; NULL: rows = size */
     const struct roth_loop *next; /* alternative loop of the arm, for poses at which the matrix
                                      of this loop is nearly singular at every angle; or NULL */
 } roth_loop;

@@ -96,8 +96,7 @@ int roth_middle(const roth_loop *r, const roth_matrix *m, double u, int count, d
     x5[0] = X5[0];
     if (count == 1) return 1;
     for (i = 0; i < count; i++)
-        for (k = 0; k < count; k++)
-            X[k * count + i] = X4[i * count + k] + MIX * X5[i * count + k];
+        for (k = 0; k < count; k++) X[k * count + i] = X4[i * count + k] + MIX * X5[i * count + k];
     if (eigenvalues(count, X, real, imaginary)) return 0;
     for (i = 0; i < count * count; i++) X[i] = X4[i] + MIX * X5[i];
     for (i = 0; i < count; i++) {

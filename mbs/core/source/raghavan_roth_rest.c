@@ -59,7 +59,8 @@ static void crossings(int prismatic, const double *n, double g, double *roots) {
 
 /* Equations A (KEPT, 2) (cos q, sin q)' = b or A (r, r^2)' = b of joint 2. */
 static void second_equations(const roth_loop *r, const double transforms[6][16],
-                             const double *beyond, const double *goal, double A[2][KEPT], double *b) {
+                             const double *beyond, const double *goal, double A[2][KEPT],
+                             double *b) {
     const int *kept = r->prismatic[0] ? PRISMATIC : REVOLUTE;
     double w[PAIR], end[PAIR], parts[3 * PAIR];
     int i, k;

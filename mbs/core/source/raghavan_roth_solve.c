@@ -44,7 +44,7 @@ static void add_shared(solution *s, double u, int count) {
     for (i = 0; i < count; i++) {
         x[0][i] = tan(0.5 * u);
         for (k = 0; k < 3; k++) middle[k] = r->prismatic[2 + k] ? x[k][i] : 2.0 * atan(x[k][i]);
-        rows = roth_rest(r, (const double(*)[16])s->transforms, middle, configurations);
+        rows = roth_rest(r, (const double (*)[16])s->transforms, middle, configurations);
         for (k = 0; k < rows; k++) add_configuration(s, configurations[k]);
     }
 }
@@ -81,7 +81,7 @@ static void begin_after_gap(double *u, int count) {
 static double set_loop(solution *s, const roth_loop *r, const double *T, double *offset) {
     s->loop = r;
     roth_transforms(r, T, s->transforms);
-    roth_eliminate(r, (const double(*)[16])s->transforms, &s->matrix);
+    roth_eliminate(r, (const double (*)[16])s->transforms, &s->matrix);
     return roth_regularity(&s->matrix, offset);
 }
 

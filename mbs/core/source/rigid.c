@@ -5,8 +5,7 @@
 void rigid_product(const double *A, const double *B, double *T) {
     int i, j;
     for (i = 0; i < 12; i += 4) {
-        for (j = 0; j < 4; j++)
-            T[i + j] = A[i] * B[j] + A[i + 1] * B[4 + j] + A[i + 2] * B[8 + j];
+        for (j = 0; j < 4; j++) T[i + j] = A[i] * B[j] + A[i + 1] * B[4 + j] + A[i + 2] * B[8 + j];
         T[i + 3] += A[i + 3];
     }
 }

@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "finite.h"
+
 /* Layout of `work` after the first 2n elements: a slope, states and scaled slopes at both ends of
  * the step for dense output, and the point of a stage. */
 static double *part(const stepper *s, int i) { return s->work + i * s->n; }
@@ -27,7 +29,7 @@ static int attempt(stepper *s, const double *x, double h) {
         for (i = 0; i < n; i++) y[i] += h / 6.0 * WEIGHT[k] * slope(s)[i];
     }
     memset(stepper_trial(s), 0, sizeof(double) * (size_t)n); /* the method has no error estimate */
-    return stepper_all_finite(y, n) ? STEPPER_OK : STEPPER_NOT_FINITE;
+    return all_finite(y, n) ? STEPPER_OK : STEPPER_NOT_FINITE;
 }
 
 static void keep(stepper *s, const double *x, double h) {

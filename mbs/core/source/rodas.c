@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "finite.h"
+
 enum { STAGES = 8 };
 
 static const double GAMMA = 0.21193756319429014;
@@ -32,18 +34,17 @@ static const double C[STAGES][STAGES - 1] = {
      -19.097331116725623, -28.087943162872662},
     {37.80277123390563, -3.2571969029072276, 112.26918849496327, 66.9347231244047,
      -40.06618937091002, -54.66780262877968, -9.48861652309627}};
-static const double TIME[STAGES] = {0.0,
-                                    0.6358126895828704,
-                                    0.4095798393397535,
-                                    0.9769306725060716,
-                                    0.4288403609558664,
-                                    1.0,
-                                    1.0,
-                                    1.0};
-static const double TIME_SLOPE[STAGES] = {0.21193756319429014, -0.42387512638858027,
-                                          -0.3384627126235924, 1.8046452872882734,
-                                          2.325825639765069,   0.0,
-                                          0.0,                 0.0};
+static const double TIME[STAGES] = {
+    0.0, 0.6358126895828704, 0.4095798393397535, 0.9769306725060716, 0.4288403609558664, 1.0, 1.0,
+    1.0};
+static const double TIME_SLOPE[STAGES] = {0.21193756319429014,
+                                          -0.42387512638858027,
+                                          -0.3384627126235924,
+                                          1.8046452872882734,
+                                          2.325825639765069,
+                                          0.0,
+                                          0.0,
+                                          0.0};
 static const double DENSE[3][STAGES] = {
     {25.948786856663858, -2.5579724845846235, 10.433815404888879, -2.3679251022685204,
      0.524948541321073, 1.1241088310450404, 0.4272876194431874, -0.17202221070155493},
@@ -74,8 +75,7 @@ static int open(stepper *s, const double *x) {
     int n = s->n;
     if (s->jacobian(s->user, stepper_time(s), x, jacobian(s), time_slope(s)))
         return STEPPER_RHS_FAILED;
-    if (!stepper_all_finite(jacobian(s), n * n) || !stepper_all_finite(time_slope(s), n))
-        return STEPPER_NOT_FINITE;
+    if (!all_finite(jacobian(s), n * n) || !all_finite(time_slope(s), n)) return STEPPER_NOT_FINITE;
     return STEPPER_OK;
 }
 
@@ -141,7 +141,7 @@ static int attempt(stepper *s, const double *x, double h) {
         double *u = stage(s, k);
         const double *f = k ? stage_slope(s) : stepper_slope(s);
         for (i = 0; i < n; i++) y[i] = x[i] + combine(s, A[k], k, i);
-        if (!stepper_all_finite(y, n)) return STEPPER_NOT_FINITE;
+        if (!all_finite(y, n)) return STEPPER_NOT_FINITE;
         if (k) status = stepper_evaluate(s, t + TIME[k] * h, y, stage_slope(s));
         for (i = 0; i < n; i++)
             u[i] = f[i] + combine(s, C[k], k, i) / h + h * TIME_SLOPE[k] * time_slope(s)[i];
@@ -150,7 +150,7 @@ static int attempt(stepper *s, const double *x, double h) {
     if (status) return status;
     for (i = 0; i < n; i++) stepper_candidate(s)[i] = y[i] + stage(s, STAGES - 1)[i];
     memcpy(y, stage(s, STAGES - 1), sizeof(double) * (size_t)n);
-    return stepper_all_finite(stepper_candidate(s), n) ? STEPPER_OK : STEPPER_NOT_FINITE;
+    return all_finite(stepper_candidate(s), n) ? STEPPER_OK : STEPPER_NOT_FINITE;
 }
 
 static void keep(stepper *s, const double *x, double h) {

@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "finite.h"
+
 /* Offsets in `memory`. */
 enum { TIME, STEP, ERROR, SLOPE_VALID, LAST_STEP, LAST_END, SLOPE };
 
@@ -95,16 +97,9 @@ double *stepper_slope(const stepper *s) { return s->memory + SLOPE; }
 double *stepper_trial(const stepper *s) { return s->work; }
 double *stepper_candidate(const stepper *s) { return s->work + s->n; }
 
-int stepper_all_finite(const double *v, int n) {
-    int i;
-    for (i = 0; i < n; i++)
-        if (!isfinite(v[i])) return 0;
-    return 1;
-}
-
 int stepper_evaluate(const stepper *s, double t, const double *x, double *xdot) {
     if (s->rhs(s->user, t, x, xdot)) return STEPPER_RHS_FAILED;
-    return stepper_all_finite(xdot, s->n) ? STEPPER_OK : STEPPER_NOT_FINITE;
+    return all_finite(xdot, s->n) ? STEPPER_OK : STEPPER_NOT_FINITE;
 }
 
 void stepper_close(stepper *s, const double *slope) {
@@ -149,7 +144,7 @@ static int project_candidate(stepper *s, const double *x, double t_new) {
     int i;
     memcpy(move, y, sizeof(double) * (size_t)s->n);
     if (s->project(s->user, t_new, y)) return STEPPER_PROJECTION_FAILED;
-    if (!stepper_all_finite(y, s->n)) return STEPPER_NOT_FINITE;
+    if (!all_finite(y, s->n)) return STEPPER_NOT_FINITE;
     for (i = 0; i < s->n; i++) move[i] -= y[i];
     s->corrected = norm(s, move, x, y) > UNMOVED;
     return STEPPER_OK;
@@ -243,7 +238,7 @@ int stepper_state(const stepper *s, const double *x, double t, double *row) {
     }
     s->method->interpolate(s, (t - (s->memory[LAST_END] - h)) / h, row);
     if (s->project && s->project(s->user, t, row)) return STEPPER_PROJECTION_FAILED;
-    return stepper_all_finite(row, s->n) ? STEPPER_OK : STEPPER_NOT_FINITE;
+    return all_finite(row, s->n) ? STEPPER_OK : STEPPER_NOT_FINITE;
 }
 
 int stepper_rewind(stepper *s, double *x, double t) {

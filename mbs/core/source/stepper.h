@@ -58,9 +58,9 @@ struct stepper {
     stepper_jacobian jacobian; /* Jacobian of the right-hand side, for implicit methods */
     void *user;
     double rtol, atol, h_max;
-    double fixed;  /* fixed step size, 0 for error control */
-    double afresh; /* size of the first step after a jump, 0 to estimate it */
-    const double *nominal; /* typical size (n,) of each state, which scales atol; NULL: all 1 */
+    double fixed;           /* fixed step size, 0 for error control */
+    double afresh;          /* size of the first step after a jump, 0 to estimate it */
+    const double *nominal;  /* typical size (n,) of each state, which scales atol; NULL: all 1 */
     const double *relative; /* factor (n,) of rtol for each state; NULL: all 1 */
     long max_steps;
     double *memory, *work;
@@ -125,12 +125,11 @@ int stepper_table(stepper *s, double *x, const double *times, long count, double
                   long budget);
 
 /* Functions for the implementation of methods. */
-double *stepper_slope(const stepper *s); /* slope (n,) at the start of the step */
-double *stepper_trial(const stepper *s); /* scratch (n,), error estimate of the last attempt */
+double *stepper_slope(const stepper *s);     /* slope (n,) at the start of the step */
+double *stepper_trial(const stepper *s);     /* scratch (n,), error estimate of the last attempt */
 double *stepper_candidate(const stepper *s); /* state (n,) at the end of the attempt */
 void stepper_close(stepper *s, const double *slope); /* store the slope, NULL if unavailable */
 /* Evaluate the right-hand side. Returns STEPPER_NOT_FINITE if an element is not finite. */
 int stepper_evaluate(const stepper *s, double t, const double *x, double *xdot);
-int stepper_all_finite(const double *v, int n);
 
 #endif

@@ -82,8 +82,7 @@ static int look(equations *e, real t, const real *x, const real *u, watched *now
     e->res[0] = now->v;
     e->res[1] = now->a;
     (void)mbs_passive(e->arg, e->res, NULL, e->loop.w, 0);
-    return all_finite(now->v, N_PASSIVE) && all_finite(now->a, N_PASSIVE) ? MBS_OK
-                                                                          : MBS_NO_RESULT;
+    return all_finite(now->v, N_PASSIVE) && all_finite(now->a, N_PASSIVE) ? MBS_OK : MBS_NO_RESULT;
 }
 #endif
 
@@ -105,12 +104,13 @@ static int within_bounds(const real *p) {
 }
 
 /* Check and store the start values, and close the loops. Steps continue from s->x and s->z. */
-static int begin(SYSTEM(state) *s, const real *x, const real *guess, real *w) {
+static int begin(SYSTEM(state) * s, const real *x, const real *guess, real *w) {
     equations e = {0};
     real *z = w + NEXT_Z;
     int status;
     use(&e, s->x, s->z, guess, s->p, w);
-    if (!all_finite(x, NX) || !all_finite(guess, NZ) || !all_finite(s->p, NP)) return MBS_NOT_FINITE;
+    if (!all_finite(x, NX) || !all_finite(guess, NZ) || !all_finite(s->p, NP))
+        return MBS_NOT_FINITE;
     if (!unit_quaternions(x)) return MBS_QUATERNION;
     if (!within_bounds(s->p)) return MBS_PARAMETER;
     status = status_of(closure_start(&e.loop, x, z));
@@ -120,7 +120,7 @@ static int begin(SYSTEM(state) *s, const real *x, const real *guess, real *w) {
     return status;
 }
 
-int SYSTEM(start)(SYSTEM(state) *s, const real *x, const real *guess, const real *p, real *w) {
+int SYSTEM(start)(SYSTEM(state) * s, const real *x, const real *guess, const real *p, real *w) {
     int status, i;
     s->t = REAL(0.0);
     s->known = 0;
@@ -140,7 +140,7 @@ static int same(const real *a, const real *b, int n) {
 }
 
 /* Compute the slope at the start of a step. The last step stored it, unless inputs have changed. */
-static int open_step(SYSTEM(state) *s, equations *e, const real *u, real *w) {
+static int open_step(SYSTEM(state) * s, equations *e, const real *u, real *w) {
     int status;
     if (s->known && same(u, s->u, NU)) return MBS_OK;
     s->known = 0;
@@ -155,7 +155,7 @@ static int open_step(SYSTEM(state) *s, equations *e, const real *u, real *w) {
 }
 
 /* Compute the state at the end and its slope, in NEXT_X, NEXT_Z and RATE of w. */
-static int advance(const SYSTEM(state) *s, equations *e, real end, real h, real *w) {
+static int advance(const SYSTEM(state) * s, equations *e, real end, real h, real *w) {
     static const real PLACE[] = {REAL(0.0), REAL(0.5), REAL(0.5), REAL(1.0)};
     static const real WEIGHT[] = {REAL(1.0), REAL(2.0), REAL(2.0), REAL(1.0)};
     real *slope = w + RATE, *at = w + POINT, *y = w + NEXT_X, *z = w + NEXT_Z;
@@ -176,7 +176,7 @@ static int advance(const SYSTEM(state) *s, equations *e, real end, real h, real 
     return closure_singular(&e->loop, y, z) ? MBS_UNDETERMINED : MBS_OK;
 }
 
-int SYSTEM(step)(SYSTEM(state) *s, const real *u, real h, real *w) {
+int SYSTEM(step)(SYSTEM(state) * s, const real *u, real h, real *w) {
     equations e = {0};
 #if NB > 0
     watched now;
@@ -204,7 +204,7 @@ int SYSTEM(step)(SYSTEM(state) *s, const real *u, real h, real *w) {
     return MBS_OK;
 }
 
-static int motion(const SYSTEM(state) *s, const real *u, real *q, real *v, real *a, real *w) {
+static int motion(const SYSTEM(state) * s, const real *u, real *q, real *v, real *a, real *w) {
     equations e = {0};
     real *x = w + CONFIGURATION, *z = w + CONFIGURATION + NX;
     int status;
@@ -223,7 +223,7 @@ static int motion(const SYSTEM(state) *s, const real *u, real *q, real *v, real 
     return all_finite(q, NQ) && all_finite(v, NV) && all_finite(a, NV) ? MBS_OK : MBS_NO_RESULT;
 }
 
-int SYSTEM(motion)(const SYSTEM(state) *s, const real *u, real *q, real *v, real *a, real *w) {
+int SYSTEM(motion)(const SYSTEM(state) * s, const real *u, real *q, real *v, real *a, real *w) {
     int i, status = motion(s, u, q, v, a, w);
     for (i = 0; i < NQ && status; i++) q[i] = NOT_A_NUMBER;
     for (i = 0; i < NV && status; i++) v[i] = a[i] = NOT_A_NUMBER;

@@ -15,12 +15,12 @@ from mbs.errors import ModelError
 from mbs.export.fmu.controller import Controller
 from mbs.export.fmu.description import FmuVariable, Member, Terminal, once, structured_name
 from mbs.export.fmu.variables import POSE, WRENCH, frame_text, pose
-from mbs.loops.closure_equations import closure_rows
 from mbs.models._energy import energy
 from mbs.models._joint_wrenches import wrenches_of_joints
 from mbs.models._measurements import readings
 from mbs.models.geometry import terminal_frame
-from mbs.models.state.independent import DriveInputs, OutputContext
+from mbs.models.state.drive import DriveInputs
+from mbs.models.state.equations import OutputContext, largest_closure_residual
 from mbs.models.symbols import ExternalForces, ModelSymbols, outputs_of, symbols_of
 from mbs.recursions.link_motions import (
     link_accelerations,
@@ -305,8 +305,7 @@ def _closure_variables(system: System, label: str) -> Iterator[FmuVariable]:
 
 
 def _closure_values(system: System, seen: OutputContext, labels: Labels) -> list[SX]:
-    rows = closure_rows(system, seen.q) if system.is_closed else SX(0)
-    return [SX(casadi.mmax(casadi.fabs(rows)))]
+    return [largest_closure_residual(system, seen.q)]
 
 
 def _bodies(system: System) -> list[str]:

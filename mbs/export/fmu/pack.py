@@ -35,32 +35,52 @@ from mbs.view.drawing_files import icon, standalone
 
 
 _CORE = (
-    "core.c",
     "message.c",
-    "values.c",
+    "log.c",
     "inputs.c",
-    "derivatives.c",
+    "machine.c",
     "closure.c",
     "watch.c",
+    "configuration.c",
     "guard.c",
     "solver.c",
-    "switching.c",
-    "exchange.c",
+    "tree_state.c",
+    "calculated.c",
+    "internal_step.c",
+    "event_mode.c",
+    "instance.c",
+    "values.c",
+    "derivatives.c",
+    "model_exchange.c",
     "cosimulation.c",
     "saved.c",
 )
 _CORE_HEADERS = (
-    "core.h",
-    "message.h",
-    "internal.h",
     "real.h",
+    "references.h",
     "closure.h",
     "watch.h",
+    "run.h",
+    "message.h",
+    "log.h",
+    "inputs.h",
+    "machine.h",
+    "configuration.h",
     "guard.h",
-    "charts.h",
     "solver.h",
+    "tree_state.h",
+    "charts.h",
+    "calculated.h",
+    "event_data.h",
+    "internal_step.h",
+    "event_mode.h",
+    "chart_choice.h",
+    "core.h",
 )
-_HOSTED = ("charts.c",)
+"""Headers from the lowest part to the highest: a file includes only its own header and headers
+before it."""
+
+_HOSTED = ("charts.c", "chart_choice.c")
 _RUNTIME = (
     "stepper",
     "events",

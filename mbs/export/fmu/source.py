@@ -11,7 +11,7 @@ from mbs.errors import ExportError, ModelError
 from mbs.export.fmu.description import FmuModel, FmuVariable, Jumps
 from mbs.loops.closing import distance_units
 from mbs.loops.examination import LEAST_SINE
-from mbs.models.state.events import MinimalEvents
+from mbs.models.state.events import StateEvents
 from mbs.models.state.tree import TreeState
 from mbs.native._compiled import generated, unwritten
 from mbs.native.frames import WorkSize
@@ -175,7 +175,7 @@ def _events(jumps: Jumps, point: list[casadi.MX]) -> list[casadi.Function]:
     ]
 
 
-def _names_of_events(events: Jumps | MinimalEvents | None, prefix: str = "mbs_") -> tuple[str, ...]:
+def _names_of_events(events: Jumps | StateEvents | None, prefix: str = "mbs_") -> tuple[str, ...]:
     """Return the names of the event functions of an FMU."""
     if events is None:
         return ()

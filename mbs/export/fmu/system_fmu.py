@@ -47,8 +47,8 @@ from mbs.export.fmu.variables import (
 from mbs.files import path_of
 from mbs.loops.cut_positions import cut_positions
 from mbs.loops.examination import configuration_health, row_independence
-from mbs.models.state.independent import MinimalState, consistent_start, minimal_state
-from mbs.models.state.tree import tree_state
+from mbs.models.state.forms import state_equations
+from mbs.models.state.independent import MinimalState, consistent_start
 from mbs.options import arguments_of, group_values
 
 
@@ -111,23 +111,16 @@ def fmu_model(system: System, options: FmuOptions | None = None) -> FmuModel:
     interface = interface_of(system, options.inputs, options.flanges)
     request = make_request(system, options.outputs, interface.flanges)
     controller = controller_of(system, options.controller, read_sources(options.sources))
-    # a solver with fixed steps cannot locate events
-    crossings = options.solver != "rk4" and options.target != "bare"
-    state = minimal_state(
+    locates_events = options.solver != "rk4"  # a solver with fixed steps cannot
+    equations = state_equations(
         system,
         lambda seen: observed_values(system, request, seen),
         interface.drive(system, controller),
-        crossings=crossings,
+        crossings=locates_events and options.target != "bare",
+        tree=options.target != "bare",
+        events=locates_events,
     )
-    tree = None
-    followed = state.events is None or options.solver != "rk4"
-    if followed and options.target != "bare":
-        tree = tree_state(
-            system,
-            lambda seen: observed_values(system, request, seen),
-            interface.drive(system, controller),
-            crossings=crossings,
-        )
+    state, tree = equations.independent, equations.tree
     x, z = consistent_start(system, state)
     positions = _cut_positions(system, state)
     x_variables = states(system, state, x)

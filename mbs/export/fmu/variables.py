@@ -16,9 +16,8 @@ from mbs.loops.closing import Closing, closure_parameters
 from mbs.loops.cut_positions import cut_positions
 from mbs.models.contacts import contacts_of
 from mbs.models.geometry import terminal_frame
-from mbs.models.state.crossings import CONTACTS
+from mbs.models.state.crossing_modes import CONTACTS
 from mbs.models.state.drive import InputMotion
-from mbs.models.state.events import element_names
 from mbs.models.state.independent import MinimalState
 from mbs.text import did_you_mean
 from mbs.units import rate_unit
@@ -279,17 +278,15 @@ def jumps(system: System, state: MinimalState) -> Jumps | None:
     events = state.events
     if events is None:
         return None
-    contacts = contacts_of(system)
-    elements = [x for x in (*contacts.stops, *contacts.frictions) if x is not None]
     modes = []
-    for element, name in zip(elements, element_names(contacts), strict=True):
+    for _, element in contacts_of(system).elements:
         text = "place: -1 at the lower limit, 1 at the upper one, 0 between them"
         if isinstance(element.law, OneWay):
             text = "-1 where it is locked, 0 where it is free"
         elif isinstance(element.law, Friction):
             text = "direction of sliding, -1 or 1, and 0 where it sticks"
-        described = f"of {name}, {text}"
-        modes.append(FmuVariable(name=f"{name}.mode", min=-1, max=1, description=described))
+        described = f"of {element.name}, {text}"
+        modes.append(FmuVariable(name=f"{element.name}.mode", min=-1, max=1, description=described))
     for name in events.modes[len(modes) :]:
         text = f"of a law that jumps: {_CROSSING[name.rpartition('.')[2]]}"
         modes.append(FmuVariable(name=name, description=text))

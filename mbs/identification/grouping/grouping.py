@@ -29,7 +29,14 @@ _DEPTH = 9
 
 
 def quotient(value: SX, divisor: SX) -> SX:
-    """Return the quotient of two scalars with common factors cancelled, such as A for A^2 / A."""
+    """Return the quotient of two scalar expressions with common factors cancelled.
+
+    For example A^2 / A is A.
+
+    Args:
+        value: scalar numerator.
+        divisor: scalar denominator.
+    """
     above, below = _factors(value), _factors(divisor)
     rest: list[SX] = []
     for factor in above:
@@ -43,7 +50,7 @@ def quotient(value: SX, divisor: SX) -> SX:
 
 
 def _factors(value: SX) -> list[SX]:
-    """Return the factors of a product expression."""
+    """Return factors of a scalar expression `value` that is a product; else the list [value]."""
     if value.is_op(casadi.OP_MUL):
         return _factors(value.dep(0)) + _factors(value.dep(1))
     if value.is_op(casadi.OP_SQ):
@@ -70,17 +77,17 @@ pivot would amplify rounding errors of 1e-13 to significant coefficients."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Grouping:
-    """Expression of every column as a combination of the kept columns.
+    """Expression of every regressor column as a linear combination of the kept columns.
 
     Attributes:
-        columns: for each column of the regressor, the coefficients of the kept columns.
+        columns: for each column of the regressor, the coefficients of the kept columns by index.
     """
 
     columns: tuple[Terms, ...]
 
     @staticmethod
     def none(size: int) -> Grouping:
-        """Return the grouping that keeps all columns."""
+        """Return the grouping of `size` columns in which all columns are kept."""
         return Grouping(tuple({k: SX(1)} for k in range(size)))
 
     @property
@@ -89,22 +96,34 @@ class Grouping:
         return [k for k, terms in enumerate(self.columns) if k in terms]
 
     def reduced(self, terms: Terms) -> dict[int, SX]:
-        """Express a combination of any columns by the kept columns."""
+        """Return a linear combination of any columns as a combination of the kept columns.
+
+        Args:
+            terms: coefficients by column index.
+
+        Returns:
+            Coefficients by index of kept columns. Coefficients that cancel are left out.
+        """
         total: dict[int, SX] = {}
         for column, coefficient in terms.items():
             for k, part in self.columns[column].items():
-                _add(total, k, coefficient * part)
+                _add_coefficient(total, k, coefficient * part)
         return total
 
     def replaced(self, dropped: int, terms: Terms) -> Grouping:
-        """Eliminate a kept column that equals a combination of other columns."""
+        """Return the grouping after a kept column is eliminated.
+
+        Args:
+            dropped: index of the kept column.
+            terms: combination of other columns, by index, that equals this column.
+        """
         equal = self.reduced(terms)
         columns = []
         for column in self.columns:
             if dropped in column:
                 changed = {k: x for k, x in column.items() if k != dropped}
                 for k, part in equal.items():
-                    _add(changed, k, column[dropped] * part)
+                    _add_coefficient(changed, k, column[dropped] * part)
                 columns.append(changed)
             else:
                 columns.append(dict(column))
@@ -114,7 +133,7 @@ class Grouping:
 def related(
     grouping: Grouping, relation: Terms, ranks: Callable[[int], int], sampled: Sampled
 ) -> Grouping:
-    """Apply a relation: a combination of columns that vanishes.
+    """Return the grouping after a relation: a combination of columns that vanishes in all states.
 
     The kept column of highest rank is eliminated, among the columns whose coefficient is nonzero at
     every sample. Among equal ranks, it is the column with the largest coefficient, so that
@@ -124,7 +143,7 @@ def related(
         grouping: grouping from earlier relations.
         relation: coefficients of the combination.
         ranks: function from column index to rank; the highest rank is eliminated first.
-        sampled: function that evaluates coefficients, to decide whether they vanish.
+        sampled: function that evaluates coefficients at samples, to decide whether they vanish.
     """
     rest = grouping.reduced(relation)
     if not rest:
@@ -143,7 +162,12 @@ def related(
 
 
 def without_zeros(grouping: Grouping, sampled: Sampled) -> Grouping:
-    """Remove coefficients whose symbolic terms cancel numerically."""
+    """Return the grouping without coefficients whose symbolic terms cancel numerically.
+
+    Args:
+        grouping: grouping with symbolic coefficients.
+        sampled: function that evaluates expressions at samples of the system parameters.
+    """
     columns = []
     for terms in grouping.columns:
         written = {k: x for k, x in terms.items() if not x.is_constant()}
@@ -154,14 +178,20 @@ def without_zeros(grouping: Grouping, sampled: Sampled) -> Grouping:
 
 
 def coefficients(grouping: Grouping) -> Iterable[tuple[int, int, SX]]:
-    """Yield (kept column, column, coefficient of the column's parameter in the base parameter)."""
+    """Yield the nonzero coefficients of the base parameters: (kept column, column, coefficient).
+
+    The base parameter of a kept column is the sum of coefficient times parameter over columns.
+
+    Args:
+        grouping: grouping of the columns.
+    """
     for number, terms in enumerate(grouping.columns):
         for k, coefficient in terms.items():
             yield k, number, coefficient
 
 
-def _add(total: dict[int, SX], k: int, part: SX) -> None:
-    """Add to one coefficient, and remove it if the sum is zero up to rounding."""
+def _add_coefficient(total: dict[int, SX], k: int, part: SX) -> None:
+    """Add `part` to the coefficient total[k] in place; delete it if the sum is zero."""
     if part.is_zero():
         return
     if k not in total:
@@ -189,28 +219,28 @@ def equation(name: str, terms: Mapping[str, SX]) -> str:
     """
     text = ""
     for parameter, coefficient in terms.items():
-        sign, factor = _sign(coefficient)
+        sign, factor = _sign_and_text(coefficient)
         term = parameter if factor == "1" else f"{factor}*{parameter}"
         lead = ("-" if sign == "-" else "") if not text else f" {sign} "
         text += lead + term
     return f"{name} = {text or '0'}"
 
 
-def _sign(coefficient: SX) -> tuple[str, str]:
-    """Return the sign ("+" or "-") of a coefficient and its magnitude as the text of a factor."""
-    negative, size = _split(coefficient)
-    return "-" if negative else "+", _factor(size)
+def _sign_and_text(coefficient: SX) -> tuple[str, str]:
+    """Return the sign ("+" or "-") of a coefficient and the text of its magnitude."""
+    negative, size = _split_sign(coefficient)
+    return "-" if negative else "+", _factor_text(size)
 
 
-def _split(value: SX) -> tuple[bool, SX]:
-    """Return whether a factor is written with a negative sign, and the factor without it."""
+def _split_sign(value: SX) -> tuple[bool, SX]:
+    """Return whether a coefficient `value` is written with a minus, and its value without it."""
     if value.is_constant():
         return float(value) < 0, SX(abs(float(value)))
     if value.is_op(casadi.OP_NEG):
-        negative, size = _split(value.dep(0))
+        negative, size = _split_sign(value.dep(0))
         return not negative, size
     if value.is_op(casadi.OP_MUL):
-        (left, first), (right, second) = _split(value.dep(0)), _split(value.dep(1))
+        (left, first), (right, second) = _split_sign(value.dep(0)), _split_sign(value.dep(1))
         return left != right, first * second
     return False, value
 
@@ -219,18 +249,23 @@ class _FactorText(Infix):
     """Text of a factor, with abs for absolute values."""
 
     def _call_text(self, op: int) -> str:
+        """Return the name of the function with CasADi operation `op`: abs for absolute values."""
         return "abs" if op == casadi.OP_FABS else super()._call_text(op)
 
 
-def _factor(value: SX) -> str:
-    """Return the text of an expression, in parentheses if it is a sum."""
+def _factor_text(value: SX) -> str:
+    """Return the text of a scalar expression `value`, in parentheses if it is a sum."""
     symbols = casadi.symvar(value)
     graph = graph_of(Function("value", [casadi.vertcat(SX(0, 1), *symbols)], [value], ["p"], ["y"]))
     return _FactorText(graph, {"p": [s.name() for s in symbols]}).text(graph.results[0][0], PRODUCT)
 
 
 def table(rows: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """Yield lines of two columns; the first is as wide as its longest entry."""
+    """Yield the lines of a text table of two columns, of which the first is padded to equal width.
+
+    Args:
+        rows: pairs (left, right) of texts.
+    """
     width = max((len(left) for left, _ in rows), default=0)
     yield from (f"{left:<{width}}  {right}".rstrip() for left, right in rows)
 
@@ -275,7 +310,13 @@ _TRIES = 40
 
 
 def default_parameters(system: System) -> Array:
-    """Return default values (np,) of the parameters, or random values if they have none."""
+    """Return the default values (np,) of the parameters of a system.
+
+    Parameters without default value have random values between 0.4 and 1.
+
+    Args:
+        system: open or closed.
+    """
     # between 0.4 and 1: typical lengths and masses of a robot, none near zero
     free = 0.4 + 0.6 * np.random.default_rng(_SEED).random(len(system.parameters))
     defaults = np.array(system.p_default, dtype=float)
@@ -283,7 +324,7 @@ def default_parameters(system: System) -> Array:
 
 
 def parameter_samples(system: System, value: SX) -> list[Array]:
-    """Return samples of the parameters: the default values, then up to three samples near them.
+    """Return samples (np,) of the parameters: default values, then up to three samples near them.
 
     Only the default values are returned if the expression does not depend on symbols.
 
@@ -309,7 +350,13 @@ def parameter_samples(system: System, value: SX) -> list[Array]:
 
 
 def sampler(system: System) -> Sampled:
-    """Return a function that evaluates scalars at samples of the system parameters."""
+    """Return a function from n scalar expressions to their values (samples, n).
+
+    The samples are those of `parameter_samples`; constant expressions have one sample.
+
+    Args:
+        system: system of the parameters.
+    """
 
     def sampled(values: list[SX]) -> Array:
         column = casadi.vertcat(*values)

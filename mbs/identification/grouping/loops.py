@@ -22,7 +22,7 @@ from mbs.assembly.khalil_frames import Cut
 from mbs.assembly.tree import Link
 from mbs.components import ConstantVelocity, Fixed
 from mbs.components.constraints import Constraint
-from mbs.components.joints import Freedom, Motion
+from mbs.components.joints import Motion
 from mbs.identification.grouping.numeric import dependence, plain
 from mbs.identification.grouping.rules import Key, lambda_transform, on_link
 from mbs.loops.reduction import reduction_matrix
@@ -61,9 +61,16 @@ _SYMMETRIC = (("XX", "YY"), ("MZ",), ("M",))
 
 
 def cut_relations(system: System) -> Iterator[Relation]:
-    """Yield relations from bodies that may be attributed to either side of a cut joint."""
+    """Yield relations from bodies that may be attributed to either side of a cut joint.
+
+    A relation maps parameters (link index, kind) to their coefficients in a combination without
+    effect.
+
+    Args:
+        system: system with closed loops.
+    """
     for cut in system.cuts:
-        axis, shared = _share(cut)
+        axis, shared = _shared_frame(cut)
         sides = [(cut.link_a, cut.pose_a, 1), (cut.link_b, cut.pose_b, -1)]
         through = {
             link: (lambda_transform(pose @ axis), sign) for link, pose, sign in sides if link >= 0
@@ -76,8 +83,12 @@ def cut_relations(system: System) -> Iterator[Relation]:
             yield relation
 
 
-def _share(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
-    """Return the frame of such a body, and combinations with equal effect on both sides."""
+def _shared_frame(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
+    """Return the frame of a body that may be attributed to either side of a cut joint.
+
+    The second result lists tuples of kinds of inertial parameters that change together with equal
+    effect on both sides.
+    """
     joint = cut.edge.joint
     freedoms = joint.freedoms
     if cut.welded or isinstance(joint, Fixed):
@@ -92,13 +103,8 @@ def _share(cut: Cut) -> tuple[Pose, tuple[tuple[str, ...], ...]]:
         return Pose.identity(), ()
     slides = len(turning) < len(freedoms)
     if len(turning) == 1 and turning[0].motion is Motion.REVOLUTE:
-        return _along(turning[0]), _SYMMETRIC[:1] if slides else _SYMMETRIC
+        return Pose.rotation(align_z(turning[0].axis)), _SYMMETRIC[:1] if slides else _SYMMETRIC
     return Pose.identity(), () if slides else _SYMMETRIC[2:]
-
-
-def _along(freedom: Freedom) -> Pose:
-    """Return the rotation that aligns the z axis with the axis of a freedom."""
-    return Pose.rotation(align_z(freedom.axis))
 
 
 def pair_relations(
@@ -118,24 +124,30 @@ def pair_relations(
     for b in range(1, len(R)):
         for a in range(b):
             relative = np.einsum("sji,sjk->sik", R[a], R[b])
-            if _constant(relative):
-                same = not base_moves and (a == 0 or _side_by_side(poses, a, b))
+            if _is_constant(relative):
+                same = not base_moves and (a == 0 or _has_constant_offset(poses, a, b))
                 yield from _shared_by_pair(a - 1, b - 1, _rotation(relative[0]), same)
 
 
 def _rotation(R: Array) -> SX:
-    """Return a constant rotation from closed configurations, whose loop errors are about 1e-13."""
+    """Return a rotation R (3, 3) of all configurations, with rounding errors removed."""
     noise = 1e-12  # ten times the loop error: smaller elements are zeros
     return SX(DM(nearest_rotation(R.tolist(), noise=noise)))
 
 
-def _side_by_side(poses: Sequence[tuple[Array, Array]], a: int, b: int) -> bool:
-    """Whether the vector between two origins is constant, so that they have the same velocity."""
-    return all(_constant(origins[b] - origins[a]) for _, origins in poses)
+def _has_constant_offset(poses: Sequence[tuple[Array, Array]], a: int, b: int) -> bool:
+    """Whether the vector between origins a and b is constant, so that they have the same velocity.
+
+    `poses` are pairs of orientations and origins as returned by `_link_poses`.
+    """
+    return all(_is_constant(origins[b] - origins[a]) for _, origins in poses)
 
 
 def _shared_by_pair(a: int, b: int, R: SX, moments: bool) -> Iterator[Relation]:
-    """Yield the relations that shift parameters of link b to link a, or drop them at the base."""
+    """Yield relations that shift parameters of link b to link a, or drop them for the base (-1).
+
+    R is the constant orientation of b relative to a; `moments` includes first moments and mass.
+    """
     through = lambda_transform(Pose.rotation(R))
     names = TEN_PARAMETERS[: (9 if a < 0 else 10) if moments else 6]
     for k, name in enumerate(names):
@@ -143,7 +155,10 @@ def _shared_by_pair(a: int, b: int, R: SX, moments: bool) -> Iterator[Relation]:
 
 
 def _link_poses(system: System, configurations: ClosedConfigurations) -> tuple[Array, Array]:
-    """Return orientations (1 + links, n, 3, 3) and origins (1 + links, n, 3) of base and links."""
+    """Return orientations (1 + links, n, 3, 3) and origins (1 + links, n, 3) of base and links.
+
+    n is the number of configurations.
+    """
     q = SX.sym("q", system.nq)
     poses = [Pose.identity(), *base_poses(system.tree, link_poses(system.tree, q))]
     at = Function("poses", [q, system.p], [casadi.horzcat(*(pose.matrix for pose in poses))])
@@ -152,8 +167,8 @@ def _link_poses(system: System, configurations: ClosedConfigurations) -> tuple[A
     return matrices[..., :3, :3], matrices[..., :3, 3]
 
 
-def _constant(values: Array) -> bool:
-    """Whether values are equal in all configurations (first axis)."""
+def _is_constant(values: Array) -> bool:
+    """Whether values (n, ...) are equal in all n configurations."""
     return bool(np.max(np.abs(values - values[0])) < _SAME)
 
 
@@ -194,38 +209,49 @@ def turning_relations(
         base_moves: whether the base moves, so that the velocities of links do not follow from the
             joints.
     """
-    G = np.concatenate([_slopes(system, each) for each in configurations])
+    G = np.concatenate([_velocity_matrices(system, each) for each in configurations])
     links = system.tree.links
     joints = {j: G[:, link.v.start] for j, link in enumerate(links) if link.motion.nv == 1}
-    angular = [] if base_moves else list(_angular(system, configurations, G))
+    angular = [] if base_moves else list(_angular_velocities(system, configurations, G))
     for j, rows in enumerate(angular):
         axis = _one_direction(rows)
         if axis is not None:
             yield {(j, _MOMENTS[k]): SX(axis[k]) for k in np.flatnonzero(axis)}
-    energies = [e for j, rows in enumerate(angular) for e in _rotational(j, rows)]
-    energies += (Effect((j, "Ia"), _product(rows, rows)) for j, rows in joints.items())
-    yield from _dependent(energies)
-    yield from _dependent([Effect((j, "Fv"), _product(g, g)) for j, g in joints.items()])
-    yield from _dependent([Effect((j, "offset"), g.ravel()) for j, g in joints.items()])
+    energies = [e for j, rows in enumerate(angular) for e in _inertia_effects(j, rows)]
+    energies += (Effect((j, "Ia"), _velocity_products(rows, rows)) for j, rows in joints.items())
+    yield from _dependence_relations(energies)
+    yield from _dependence_relations(
+        [Effect((j, "Fv"), _velocity_products(g, g)) for j, g in joints.items()]
+    )
+    yield from _dependence_relations([Effect((j, "offset"), g.ravel()) for j, g in joints.items()])
     yield from _dry_friction(links, joints)
 
 
 def configurations_needed(system: System) -> int:
-    """Return a number of configurations that avoids accidental dependence of velocity products."""
+    """Return a number of configurations that avoids accidental dependence of velocity products.
+
+    Args:
+        system: system with closed loops.
+    """
     effects = 6 * len(system.tree.links) + system.nv
     m = max(len(system.active), 1)
     return max(12, -(-3 * effects // (m * (m + 1))))
 
 
-def _slopes(system: System, configurations: ClosedConfigurations) -> Array:
+def _velocity_matrices(system: System, configurations: ClosedConfigurations) -> Array:
     """Return the matrices (configurations, nv, m) from independent to tree velocities."""
     at = reduction_matrix(system)
     p = [configurations.p] if configurations.p.size else []
     return np.array([np.array(at(position, *p)) for position in configurations.q.T])
 
 
-def _angular(system: System, configurations: Sequence[ClosedConfigurations], G: Array) -> Array:
-    """Return the angular velocities (links, configurations, 3, m) in the frames of the links."""
+def _angular_velocities(
+    system: System, configurations: Sequence[ClosedConfigurations], G: Array
+) -> Array:
+    """Return the angular velocities (links, configurations, 3, m) in the frames of the links.
+
+    G are the matrices of `_velocity_matrices`: from independent to tree velocities.
+    """
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     motions = link_velocities(system.tree, link_poses(system.tree, q), v)
     slopes = [casadi.densify(casadi.jacobian(motion.w, v)) for motion in motions]
@@ -237,7 +263,10 @@ def _angular(system: System, configurations: Sequence[ClosedConfigurations], G: 
 
 
 def _one_direction(rows: Array) -> Array | None:
-    """Return the constant direction (3,) of an angular velocity (configurations, 3, m), or None."""
+    """Return constant direction (3,) of angular velocities `rows` (configurations, 3, m), or None.
+
+    None if the direction varies or the angular velocity is always zero.
+    """
     columns = rows.transpose(1, 0, 2).reshape(3, -1)
     U, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     if sizes[0] < _SAME or sizes[1] > _SAME * sizes[0]:
@@ -248,20 +277,27 @@ def _one_direction(rows: Array) -> Array | None:
     return unit
 
 
-def _rotational(j: int, rows: Array) -> Iterator[Effect]:
-    """Yield the energy effects of the inertia tensor of link j, from its angular velocity."""
+def _inertia_effects(j: int, rows: Array) -> Iterator[Effect]:
+    """Yield the effects of the inertia tensor of link j on its kinetic energy.
+
+    `rows` (configurations, 3, m) is its angular velocity per independent velocity.
+    """
     for name, (k, i) in zip(TEN_PARAMETERS, zip(*np.triu_indices(3), strict=True), strict=False):
-        yield Effect((j, name), (1 if k == i else 2) * _product(rows[:, k], rows[:, i]))
+        yield Effect((j, name), (1 if k == i else 2) * _velocity_products(rows[:, k], rows[:, i]))
 
 
-def _product(first: Array, second: Array) -> Array:
-    """Return the products of two velocities (configurations, m) as quadratic forms, flattened."""
+def _velocity_products(first: Array, second: Array) -> Array:
+    """Return products of two velocities, `first` and `second` (configurations, m), as one vector.
+
+    Each product is a quadratic form in the m independent velocities; its coefficients are listed
+    for every configuration.
+    """
     k, i = np.triu_indices(first.shape[1])
     return np.ravel(first[:, k] * second[:, i] + first[:, i] * second[:, k])
 
 
-def _dependent(effects: Sequence[Effect]) -> Iterator[Relation]:
-    """Yield relations between parameters with dependent effects."""
+def _dependence_relations(effects: Sequence[Effect]) -> Iterator[Relation]:
+    """Yield relations between the parameters whose effects are linearly dependent."""
     if not effects:
         return
     found = dependence(np.column_stack([e.column for e in effects]), range(len(effects)))
@@ -276,7 +312,10 @@ def _dependent(effects: Sequence[Effect]) -> Iterator[Relation]:
 
 
 def _dry_friction(links: Sequence[Link], joints: dict[int, Array]) -> Iterator[Relation]:
-    """Yield relations of Coulomb friction of joints at rest or with a constant velocity ratio."""
+    """Yield relations of Coulomb friction of joints at rest or with a constant velocity ratio.
+
+    `joints` maps link indices to joint velocities (configurations, m) per independent velocity.
+    """
     for k, rows in joints.items():
         if np.max(np.abs(rows)) < _SAME:
             yield {(k, "Fs"): SX(1)}

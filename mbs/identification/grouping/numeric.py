@@ -16,7 +16,7 @@ from mbs.assembly import System
 from mbs.assembly.tree import quaternion_slices
 from mbs.errors import ModelError
 from mbs.identification.grouping.grouping import Check, Grouping, equation
-from mbs.identification.regressors import Column, every_column, numbers_among, regressor
+from mbs.identification.regressors import Column, column_indices, every_column, regressor
 from mbs.loops.closing import Closing
 from mbs.loops.examination import configuration_report
 from mbs.loops.reduction import reduction_matrix
@@ -71,6 +71,9 @@ def dependence(W: Array, order: Sequence[int]) -> Dependence:
     Args:
         W: (rows, n) matrix with at least as many rows as columns.
         order: permutation of the column indices, in decreasing preference.
+
+    Returns:
+        Independent columns, the other columns as their combinations, and numerical quality.
     """
     lengths = np.linalg.norm(W, axis=0)
     longest = float(np.max(lengths, initial=0.0))
@@ -95,7 +98,10 @@ def dependence(W: Array, order: Sequence[int]) -> Dependence:
 
 
 def _rank(values: Array) -> tuple[int, float]:
-    """Return the rank at the largest ratio of successive singular values, and this ratio."""
+    """Return the rank at the largest ratio of successive singular values, and this ratio.
+
+    `values` are singular values in decreasing order.
+    """
     parts = np.maximum(values / values[0], _FLOOR)
     ratios = parts[:-1] / parts[1:]
     small = parts[1:] < _LARGEST_ZERO
@@ -106,7 +112,7 @@ def _rank(values: Array) -> tuple[int, float]:
 
 
 def plain(x: float) -> float:
-    """Round a value to an integer if it is close to it."""
+    """Return x, rounded to an integer if it is closer than 1e-8 to it."""
     return float(round(x)) if abs(x - round(x)) < _ROUNDING else float(x)
 
 
@@ -144,7 +150,11 @@ class States:
         return int(self.q.shape[1])
 
     def on_moving_base(self, seed: int) -> States:
-        """Return the states with a random motion of the base."""
+        """Return the states with a random velocity, acceleration and orientation of the base.
+
+        Args:
+            seed: seed of the random numbers.
+        """
         rng = np.random.default_rng(seed)
         v_0, a_0 = rng.uniform(-3, 3, (6, self.count)), rng.uniform(-5, 5, (6, self.count))
         turns = np.linalg.qr(rng.standard_normal((self.count, 3, 3)))[0]
@@ -169,12 +179,12 @@ def random_states(system: System, p: Array, count: int, seed: int) -> States:
         configurations = closed_positions(system, p, _CONFIGURATIONS, seed)
         q = configurations[:, np.arange(count) % configurations.shape[1]]
     else:
-        q = _any(system, count, rng)
+        q = _random_positions(system, count, rng)
     return States(q, rng.uniform(-2, 2, (m, count)), rng.uniform(-3, 3, (m, count)))
 
 
-def _any(system: System, count: int, rng: np.random.Generator) -> Array:
-    """Return random positions (nq, count) with unit quaternions."""
+def _random_positions(system: System, count: int, rng: np.random.Generator) -> Array:
+    """Return random positions (nq, count) with unit quaternions, for an open system."""
     scale = np.array([np.pi if c.unit == "rad" else 1.0 for c in system.coordinates])
     q = scale[:, None] * rng.uniform(-1, 1, (system.nq, count))
     return _normalise(system, q)
@@ -211,7 +221,11 @@ def closed_positions(system: System, p: Array, count: int, seed: int) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _ConfigurationWalk:
-    """State of a random walk on closed configurations."""
+    """Random walk on the closed configurations of a system.
+
+    `G` maps positions to the matrix from independent to tree velocities, `values` are parameters by
+    name, `start` (nq,) is the first configuration, and `least` the smallest accepted `leads`.
+    """
 
     system: System
     closing: Closing
@@ -222,7 +236,10 @@ class _ConfigurationWalk:
 
     @staticmethod
     def of(system: System, p: Array) -> _ConfigurationWalk:
-        """Start at the assembled configuration, with the loops closed for these parameters."""
+        """Return a walk from the assembled configuration, with loops closed at parameters p (np,).
+
+        Raises ModelError if they do not close.
+        """
         closing = Closing(system, p)
         found = closing.nearest(np.array(system.configuration))
         if not found.is_closed:
@@ -238,7 +255,12 @@ class _ConfigurationWalk:
         return _ConfigurationWalk(system, closing, G, values, found.q, min(_LEAST_LEAD, leads / 4))
 
     def moved(self, q: Array, rng: np.random.Generator) -> Array:
-        """Return the configuration after some steps; the direction reverses at singularities."""
+        """Return configuration (nq,) after eight steps from q; it turns back at singularities.
+
+        Args:
+            q: (nq,) closed configuration.
+            rng: random number generator of the directions.
+        """
         direction = rng.uniform(-1, 1, len(self.system.active))
         for _ in range(_STEPS):
             following = self._step(q, direction)
@@ -249,9 +271,12 @@ class _ConfigurationWalk:
         return q
 
     def _step(self, q: Array, direction: Array) -> Array | None:
-        """Return the closed configuration after a step along independent velocities.
+        """Return the closed configuration (nq,) after a step along independent velocities (m,).
 
         None if the loops do not close nearby, or the result is near a singular configuration.
+
+        q is a closed configuration (nq,), `direction` (m,) the velocities; its length does not
+        matter.
         """
         p = self.closing.p
         arguments = (q, p) if p.size else (q,)
@@ -267,7 +292,7 @@ class _ConfigurationWalk:
 
 
 def _normalise(system: System, q: Array) -> Array:
-    """Return positions (nq, count) with quaternions of unit length, changed in place."""
+    """Scale the quaternions in positions q (nq, count) to unit length, in place; return q."""
     for part in quaternion_slices(system.tree):
         q[part] /= np.linalg.norm(q[part], axis=0)
     return q
@@ -277,7 +302,7 @@ def _normalise(system: System, q: Array) -> Array:
 
 
 def sampled_regressor(system: System, columns: Sequence[Column], states: States, p: Array) -> Array:
-    """Return the regressor (rows, columns) at all states, stacked.
+    """Return the regressor at all states, stacked to a matrix (rows, columns).
 
     The regressor Function with all columns of these kinds is cached for other selections of
     columns.
@@ -292,7 +317,7 @@ def sampled_regressor(system: System, columns: Sequence[Column], states: States,
         ModelError: a column is not a parameter of the system.
     """
     every = every_column(system, columns)
-    numbers = numbers_among(system, every, columns)
+    numbers = column_indices(system, every, columns)
     D = regressor(system, every, moving_base=states.base is not None)
     inputs = [states.q, states.v, states.a, *(states.base or ())]
     inputs += [np.tile(p[:, None], (1, states.count))] if system.parameters else []
@@ -328,7 +353,15 @@ class RegressorSample:
     def of(
         system: System, columns: Sequence[Column], p: Array, seed: int, *, base_moves: bool = False
     ) -> RegressorSample:
-        """Evaluate the regressor at random states, with at least three rows per column."""
+        """Return the regressor at random states, with at least three rows per column.
+
+        Args:
+            system: open or closed.
+            columns: parameters of the system.
+            p: (np,) parameters of the system.
+            seed: seed of the random states.
+            base_moves: whether the base has a random motion.
+        """
         count = 8 + -(-3 * len(columns) // max(len(system.active), 1))
         states = random_states(system, p, count, seed)
         states = states.on_moving_base(seed) if base_moves else states
@@ -336,10 +369,14 @@ class RegressorSample:
 
 
 def preferred_order(columns: Sequence[Column], first: Sequence[int] = ()) -> list[int]:
-    """Return the column indices in order of preference: links near the base first.
+    """Return the column indices by preference as base parameters: links near the base first.
 
     Within a link, YY, MZ and M come last. With this order, QR keeps the same parameters as the tree
     rules.
+
+    Args:
+        columns: parameters of the system.
+        first: indices of columns that come before all others.
     """
     known = {kind: k for k, kind in enumerate(_PREFERRED)}
     rest = [k for k in range(len(columns)) if k not in first]
@@ -348,12 +385,19 @@ def preferred_order(columns: Sequence[Column], first: Sequence[int] = ()) -> lis
 
 
 def grouped_by_rank(sample: RegressorSample, order: Sequence[int]) -> tuple[Grouping, Check]:
-    """Return the grouping by independent columns in this order, and its check."""
+    """Return the grouping by the independent columns of a sampled regressor, and its check.
+
+    Args:
+        sample: regressor at random states.
+        order: column indices in decreasing preference.
+    """
     found = dependence(sample.W, order)
     grouping = applied(Grouping.none(len(sample.columns)), found)
-    text = f"the regressor in random states has the rank {len(found.independent)}" + _gap(found)
+    text = f"the regressor in random states has the rank {len(found.independent)}" + _gap_text(
+        found
+    )
     check = Check(
-        len(found.independent), True, (), True, found.residual, found.gap, _sentence(text)
+        len(found.independent), True, (), True, found.residual, found.gap, _capitalised(text)
     )
     return grouping, check
 
@@ -361,7 +405,7 @@ def grouped_by_rank(sample: RegressorSample, order: Sequence[int]) -> tuple[Grou
 def applied(
     grouping: Grouping, found: Dependence, numbers: Sequence[int] | None = None
 ) -> Grouping:
-    """Eliminate dependent columns from a grouping.
+    """Return a grouping without the columns that were found to be dependent.
 
     Args:
         grouping: grouping to extend.
@@ -387,6 +431,9 @@ def checked(
         grouping: grouping by the rules.
         beta: (kept, columns) numeric coefficients of the grouping.
         order: column indices in order of preference.
+
+    Returns:
+        Rank of the regressor, largest error of the grouped regressor, and missing relations.
     """
     kept, W = grouping.kept, sample.W
     longest = float(np.max(np.linalg.norm(W, axis=0), initial=NONZERO))
@@ -398,12 +445,22 @@ def checked(
     exact = error < _EXACT
     relations = relation_texts(sample.columns, kept, found) if exact else ()
     agrees = exact and rank == len(kept)
-    text = _verdict(len(kept), rank, relations) if exact else _inexact(error)
-    return Check(rank, agrees, relations, False, error, full.gap, _sentence(text + _gap(full)))
+    text = _rank_text(len(kept), rank, relations) if exact else _error_text(error)
+    return Check(
+        rank, agrees, relations, False, error, full.gap, _capitalised(text + _gap_text(full))
+    )
 
 
 def remainder(sample: RegressorSample, grouping: Grouping, order: Sequence[int]) -> Dependence:
-    """Return the dependence between the kept columns."""
+    """Return the linear dependence between the columns that a grouping keeps.
+
+    Indices in the result are those in `grouping.kept`.
+
+    Args:
+        sample: regressor at random states.
+        grouping: grouping by the rules.
+        order: column indices in decreasing preference.
+    """
     kept = grouping.kept
     return dependence(sample.W[:, kept], [kept.index(k) for k in order if k in kept])
 
@@ -411,7 +468,13 @@ def remainder(sample: RegressorSample, grouping: Grouping, order: Sequence[int])
 def relation_texts(
     columns: Sequence[Column], kept: Sequence[int], found: Dependence
 ) -> tuple[str, ...]:
-    """Return equations of the dependent columns, such as D(XX1) = ..."""
+    """Return the equation of each dependent column as text, such as "D(XX1) = D(ZZ2)".
+
+    Args:
+        columns: all parameters of the regressor.
+        kept: indices of the columns among which the dependence was computed.
+        found: dependence between these columns.
+    """
     lines = []
     for k, column in enumerate(found.dependent):
         pairs = zip(found.independent, found.factors[:, k], strict=True)
@@ -420,30 +483,33 @@ def relation_texts(
     return tuple(lines)
 
 
-def _inexact(error: float) -> str:
-    """Return the error text for rules that do not reproduce the regressor."""
+def _error_text(error: float) -> str:
+    """Return the message that the rules do not reproduce the regressor, with the relative error."""
     return (
         f"the rules are not exact: the grouped regressor differs by {error:.2g} of its longest"
         " column"
     )
 
 
-def _verdict(count: int, rank: int, relations: Sequence[str]) -> str:
-    """Return text that compares the number of kept parameters to the rank of the regressor."""
+def _rank_text(count: int, rank: int, relations: Sequence[str]) -> str:
+    """Return text that compares the `count` of kept parameters to the rank of the regressor.
+
+    `relations` are texts of the missing relations.
+    """
     if count == rank:
         return f"the rules keep {count} parameters, which is the rank of the regressor"
     told = "; ".join(relations)
     return f"the rules keep {count} parameters, but the regressor has the rank {rank}: {told}"
 
 
-def _gap(found: Dependence) -> str:
-    """Return text on the gap of the singular values at the rank; empty if it is infinite."""
+def _gap_text(found: Dependence) -> str:
+    """Return text on the gap of the singular values at rank in `found`; empty if it is infinite."""
     if np.isinf(found.gap):
         return ""
     doubt = ", so narrow that the rank is in doubt" if found.gap < _NARROW else ""
     return f" (gap of the singular values {found.gap:.1e}{doubt})"
 
 
-def _sentence(text: str) -> str:
+def _capitalised(text: str) -> str:
     """Return the text with an upper-case first letter."""
     return text[0].upper() + text[1:]

@@ -64,23 +64,23 @@ class Structure:
         return self.orientations[..., 2]
 
     def turning(self, links: list[int]) -> list[int]:
-        """Return the links with a revolute, spherical or free joint."""
+        """Return the link indices among `links` whose joint is revolute, spherical or free."""
         return [k for k in links if self.tree.links[k].motion in _TURNING]
 
     def sliding(self, links: list[int]) -> list[int]:
-        """Return the links with a prismatic joint."""
+        """Return the link indices among `links` whose joint is prismatic."""
         return [k for k in links if self.tree.links[k].motion is Motion.PRISMATIC]
 
     def before(self, j: int) -> list[int]:
-        """Return the links between the base and link j, without link j."""
+        """Return the indices of the links between the base and link j, without link j."""
         return self.tree.path(j)[:-1]
 
     def rests(self, links: list[int]) -> bool:
-        """Whether a chain of these links has a constant orientation."""
+        """Whether a chain of the joints of `links` (indices) has a constant orientation."""
         return not self.base_moves and not self.turning(links)
 
     def one_direction(self, links: list[int]) -> bool:
-        """Whether all rotations of a chain of these links are about parallel axes."""
+        """Whether all rotations of the joints of `links` (indices) are about parallel axes."""
         turning = self.turning(links)
         if self.base_moves:
             return False
@@ -89,35 +89,35 @@ class Structure:
         return all(self.parallel(turning[0], k) for k in turning)
 
     def parallel(self, j: int, k: int) -> bool:
-        """Whether two axes are parallel at the zero position."""
+        """Whether the joint axes of links j and k are parallel at the zero position."""
         return _vanishes(np.cross(self.axes[:, j], self.axes[:, k]))
 
     def never_parallel(self, j: int, k: int) -> bool:
-        """Whether two axes are not parallel at the zero position, for every sample."""
+        """Whether the axes of joints j and k are not parallel at zero position in any sample."""
         normal = np.cross(self.axes[:, j], self.axes[:, k])
         return bool(np.min(np.linalg.norm(normal, axis=1)) > _SAME)
 
     def perpendicular(self, j: int, k: int) -> bool:
-        """Whether two axes are perpendicular at the zero position."""
+        """Whether the joint axes of links j and k are perpendicular at the zero position."""
         return _vanishes(np.sum(self.axes[:, j] * self.axes[:, k], axis=1))
 
     def coaxial(self, j: int, k: int) -> bool:
-        """Whether two axes are on the same line at the zero position."""
+        """Whether the joint axes of links j and k are on the same line at the zero position."""
         between = np.cross(self.origins[:, k] - self.origins[:, j], self.axes[:, j])
         return self.parallel(j, k) and _vanishes(between)
 
     def axes_in(self, k: int, j: int) -> Array:
-        """Return the axis (samples, 3) of link k in the axes of frame j at the zero position."""
+        """Return the axis (samples, 3) of joint k in the axes of frame j at the zero position."""
         seen: Array = np.einsum("sab,sa->sb", self.orientations[:, j], self.axes[:, k])
         return seen
 
     def point_rests(self, j: int, points: Array) -> bool:
         """Whether points (samples, 3) on axis j are fixed under all joints that precede link j."""
         before = self.before(j)
-        return not self.base_moves and all(self._holds(k, points) for k in before)
+        return not self.base_moves and all(self._keeps_points(k, points) for k in before)
 
-    def _holds(self, k: int, points: Array) -> bool:
-        """Whether points (samples, 3) are on the axis, or at the centre, of joint k."""
+    def _keeps_points(self, k: int, points: Array) -> bool:
+        """Whether points (samples, 3) do not move under joint k: on its axis, or at its centre."""
         match self.tree.links[k].motion:
             case Motion.REVOLUTE:
                 return self.on_axis(points, k)
@@ -135,15 +135,15 @@ class Structure:
         return not self.base_moves and _vanishes(self.gravity)
 
     def gravity_along(self, j: int) -> bool:
-        """Whether gravity is zero or parallel to axis j at the zero position."""
+        """Whether gravity is zero or parallel to axis j at the zero position (fixed base)."""
         return not self.base_moves and _vanishes(np.cross(self.gravity, self.axes[:, j]))
 
     def gravity_across(self, j: int) -> bool:
-        """Whether gravity is zero or perpendicular to axis j at the zero position."""
+        """Whether gravity is zero or perpendicular to axis j at the zero position (fixed base)."""
         return not self.base_moves and _vanishes(np.sum(self.gravity * self.axes[:, j], axis=1))
 
     def seen_from_link(self, k: int, j: int) -> Pose:
-        """Return the pose of frame k relative to j at zero position, with k on the path of j."""
+        """Return the pose of frame k in frame j at the zero position; k is an ancestor of j."""
         pose = Pose.identity()
         path = self.tree.path(j)
         for link in path[path.index(k) + 1 :]:
@@ -152,7 +152,12 @@ class Structure:
 
 
 def structure_of(system: System, *, base_moves: bool = False) -> Structure:
-    """Return the structure of the tree of a system."""
+    """Return the axes of the tree of a system at its zero position.
+
+    Args:
+        system: open or closed.
+        base_moves: whether the base has an arbitrary prescribed motion.
+    """
     tree = system.tree
     poses: list[Pose] = []
     for link in tree.links:
@@ -176,7 +181,7 @@ def structure_of(system: System, *, base_moves: bool = False) -> Structure:
 
 
 def _vanishes(values: Array) -> bool:
-    """Whether all values are zero up to rounding."""
+    """Whether all values are zero up to rounding; True for an empty array."""
     return bool(np.max(np.abs(values), initial=0.0) < _SAME)
 
 
@@ -202,7 +207,7 @@ def resting_height(structure: Structure, j: int) -> SX | None:
 
 
 def _height_where_all_meet(structure: Structure, j: int, k: int) -> SX | None:
-    """Return the coordinate along axis j of its intersection with axis k; None if it moves."""
+    """Return the coordinate along axis j of its intersection with axis k [m]; None if it moves."""
     axes = structure.axes
     between = structure.origins[:, k] - structure.origins[:, j]
     normal = np.cross(axes[:, j], axes[:, k])
@@ -265,15 +270,24 @@ class Removal:
 
 
 def tree_rules(structure: Structure) -> Iterator[Removal]:
-    """Yield the eliminations of a tree in order of application, from its last link to its first."""
+    """Yield the eliminations of parameters of a tree in order of application.
+
+    They run from its last link to its first.
+
+    Args:
+        structure: structure of the tree.
+    """
     for j in reversed(range(len(structure.tree.links))):
         yield from _moved_to_antecedent(structure, j)
         yield from _without_effect(structure, j)
-        yield from _rotor(structure, j)
+        yield from _rotor_rules(structure, j)
 
 
 def _moved_to_antecedent(structure: Structure, j: int) -> Iterator[Removal]:
-    """Yield parameters of link j that are regrouped with its antecedent i, or lost at the base."""
+    """Yield eliminations of parameters of link j that are regrouped with its antecedent.
+
+    They have no effect if the antecedent is the base.
+    """
     link = structure.tree.links[j]
     combinations: list[tuple[str, dict[str, float], dict[str, float]]] = []
     match link.motion:
@@ -302,31 +316,31 @@ def _moved_to_antecedent(structure: Structure, j: int) -> Iterator[Removal]:
 
 
 def _without_effect(structure: Structure, j: int) -> Iterator[Removal]:
-    """Yield parameters of link j that have no effect on the efforts."""
+    """Yield the eliminations of parameters of link j that depend on the motions it can have."""
     match structure.tree.links[j].motion:
         case Motion.REVOLUTE:
-            yield from _revolute(structure, j)
+            yield from _revolute_rules(structure, j)
         case Motion.PRISMATIC:
-            yield from _prismatic(structure, j)
+            yield from _prismatic_rules(structure, j)
         case Motion.SPHERICAL:
-            yield from _spherical(structure, j)
+            yield from _spherical_rules(structure, j)
 
 
-def _revolute(structure: Structure, j: int) -> Iterator[Removal]:
-    """Apply the rules of revolute joints.
+def _revolute_rules(structure: Structure, j: int) -> Iterator[Removal]:
+    """Yield the eliminations for a revolute link j.
 
     A link that rotates about one direction has ZZ only. A link on a fixed axis along gravity has no
     MX and MY.
     """
     if structure.one_direction([*structure.before(j), j]):
-        yield from _nothing(j, ("XX", "XY", "XZ", "YZ"))
-    if _on_line(structure, j):
-        yield from _nothing(j, ("MX", "MY"))
+        yield from _all_removed(j, ("XX", "XY", "XZ", "YZ"))
+    if _is_on_fixed_line(structure, j):
+        yield from _all_removed(j, ("MX", "MY"))
     elif structure.weightless:
         yield from _about_resting_point(structure, j)
 
 
-def _on_line(structure: Structure, j: int) -> bool:
+def _is_on_fixed_line(structure: Structure, j: int) -> bool:
     """Whether axis j is a fixed line, with zero gravity or gravity along it."""
     before = structure.before(j)
     return (
@@ -338,7 +352,7 @@ def _on_line(structure: Structure, j: int) -> bool:
 
 
 def _about_resting_point(structure: Structure, j: int) -> Iterator[Removal]:
-    """Eliminate MX and MY about a fixed point on axis j, which have no effect without gravity."""
+    """Yield the elimination of MX and MY about a fixed point on axis j, without gravity."""
     height = resting_height(structure, j)
     if height is None:
         return
@@ -348,27 +362,27 @@ def _about_resting_point(structure: Structure, j: int) -> Iterator[Removal]:
         yield Removal((j, name), {key: x for key, x in effects.items() if key != (j, name)})
 
 
-def _prismatic(structure: Structure, j: int) -> Iterator[Removal]:
-    """Apply the rules of prismatic joints: first moments need a preceding joint that rotates."""
+def _prismatic_rules(structure: Structure, j: int) -> Iterator[Removal]:
+    """Yield eliminations of first moments of a prismatic link j, which need an earlier rotation."""
     before = structure.before(j)
     turning = structure.turning(before)
     if structure.rests(before):
-        yield from _nothing(j, _MOMENTS)
+        yield from _all_removed(j, _MOMENTS)
     elif structure.one_direction(before) and structure.parallel(turning[0], j):
         through = lambda_transform(structure.tree.links[j].pose())
         for name in ("MX", "MY"):
             antecedent = structure.tree.links[j].antecedent
             yield Removal((j, name), on_link(antecedent, _column(through, name)))
-        yield from _nothing(j, ("MZ",))
+        yield from _all_removed(j, ("MZ",))
     elif structure.one_direction(before):
-        yield _moments_across(structure, turning[0], j)
+        yield _moment_along_rotation(structure, turning[0], j)
 
 
-def _moments_across(structure: Structure, first: int, j: int) -> Removal:
-    """Eliminate the first moment along the only direction of rotation, which has no effect.
+def _moment_along_rotation(structure: Structure, first: int, j: int) -> Removal:
+    """Return the elimination of the first moment of link j along its only direction of rotation.
 
-    If (ax, ay, az) is this direction in frame j, it is ax MX + ay MY + az MZ. The eliminated
-    parameter is the last one whose factor is nonzero for all samples.
+    It has no effect. With the axis (ax, ay, az) of link `first` in frame j, it is ax MX + ay MY +
+    az MZ. The eliminated parameter is the last one whose factor is nonzero for all samples.
     """
     axis = structure.seen_from_link(first, j).R[:, 2]
     sizes = np.abs(structure.axes_in(first, j))
@@ -379,14 +393,14 @@ def _moments_across(structure: Structure, first: int, j: int) -> Removal:
     return Removal((j, _MOMENTS[leaving]), effects)
 
 
-def _spherical(structure: Structure, j: int) -> Iterator[Removal]:
-    """Eliminate the first moments about a fixed centre, which have no effect without gravity."""
+def _spherical_rules(structure: Structure, j: int) -> Iterator[Removal]:
+    """Yield the elimination of first moments of link j about a fixed centre, without gravity."""
     if structure.weightless and structure.point_rests(j, structure.origins[:, j]):
-        yield from _nothing(j, _MOMENTS)
+        yield from _all_removed(j, _MOMENTS)
 
 
-def _rotor(structure: Structure, j: int) -> Iterator[Removal]:
-    """Eliminate the rotor inertia of a joint if parameters of the link have the same effect."""
+def _rotor_rules(structure: Structure, j: int) -> Iterator[Removal]:
+    """Yield the elimination of Ia or Jm of joint j if other parameters have the same effect."""
     effects, rotor = _rotor_effects(structure, j), structure.tree.links[j].rotor
     if effects is not None:
         yield Removal((j, "Ia"), effects)
@@ -397,7 +411,7 @@ def _rotor(structure: Structure, j: int) -> Iterator[Removal]:
 
 
 def _rotor_effects(structure: Structure, j: int) -> Effects | None:
-    """Return the parameters with the same effect as Ia; None if there are none."""
+    """Return the parameters with the same effect as Ia of joint j; None if there are none."""
     link = structure.tree.links[j]
     match link.motion:
         case Motion.REVOLUTE if _turns_alone(structure, j):
@@ -405,7 +419,7 @@ def _rotor_effects(structure: Structure, j: int) -> Effects | None:
         case Motion.SPHERICAL if structure.rests(structure.before(j)):
             return {(j, name): SX(1) for name in ("XX", "YY", "ZZ")}
         case Motion.PRISMATIC if _slides_alone(structure, j):
-            return {(j, "M"): SX(1), **_mass_before(link)}
+            return {(j, "M"): SX(1), **_mass_on_antecedent(link)}
     return None
 
 
@@ -428,8 +442,11 @@ def _slides_alone(structure: Structure, j: int) -> bool:
     )
 
 
-def _mass_before(link: Link) -> dict[Key, SX]:
-    """Return minus the parameters of a unit mass at the origin of frame j, fixed to link i."""
+def _mass_on_antecedent(link: Link) -> dict[Key, SX]:
+    """Return minus the parameters on the antecedent of a unit mass at the origin of the link.
+
+    Empty if the antecedent is the base.
+    """
     if link.antecedent < 0:
         return {}
     through = lambda_transform(link.pose())
@@ -437,16 +454,21 @@ def _mass_before(link: Link) -> dict[Key, SX]:
 
 
 def _column(through: SX, name: str) -> SX:
-    """Return the column of a matrix that belongs to an inertial parameter by name."""
+    """Return the column of a matrix (rows, 10) of the inertial parameter `name`, such as "XX"."""
     return through[:, TEN_PARAMETERS.index(name)]
 
 
 def on_link(link: int, column: SX) -> dict[Key, SX]:
-    """Map the nonzero parameters (10, 1) of a body fixed to a link to parameter keys."""
+    """Return a dict from (link, kind) to the nonzero inertial parameters in a column.
+
+    Args:
+        link: index of the link.
+        column: (10, 1) inertial parameters.
+    """
     pairs = zip(TEN_PARAMETERS, elements(column), strict=True)
     return {(link, name): x for name, x in pairs if not x.is_zero()}
 
 
-def _nothing(j: int, names: Iterable[str]) -> Iterator[Removal]:
-    """Yield removals of parameters of link j that have no effect at all."""
+def _all_removed(j: int, names: Iterable[str]) -> Iterator[Removal]:
+    """Yield eliminations of the parameters `names` of link j, which have no effect at all."""
     yield from (Removal((j, name), {}) for name in names)

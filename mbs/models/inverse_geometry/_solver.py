@@ -27,6 +27,7 @@ class PoseAnswer(PoseDraft):
     Attributes:
         q: (m, nq) configurations, angles in (-pi, pi] [rad or m].
         residual: (m,) largest absolute element of pose(q) - T [m or 1].
+        labels: name of the branch of each configuration.
         singular: whether `solve` was used because the compiled call did not certify the result, as
             near a singular configuration. Copies are then merged, and `solutions` contains
             multiplicities and self-motions.

@@ -63,7 +63,7 @@ class PoseKernel:
         else:
             self.labels = branch_labels(chain, solves, p)
         self.names = dict(enumerate(self.labels))
-        self._handed = core.handed_of(self.arm)
+        self._c_arm = core.c_arm_of(self.arm)
         self._lock = threading.Lock()
         self._code: _PoseCode | None = None
         self._buffers: _Buffers | None = None
@@ -135,8 +135,7 @@ class PoseKernel:
             if self._buffers is None:
                 self._buffers = _Buffers(plain_branches(self.chain, sequence, self.p))
             every = self._buffers.values(T)
-        handed = self._handed
-        found = core.settled_by(library, handed, T, every, bounds_of(sequence))
+        found = core.settled_by(library, self._c_arm, T, every, bounds_of(sequence))
         return self._draft(*found)
 
 
@@ -218,12 +217,12 @@ def _pose_code(chain: FrameChain, p: Array, solves: StepSequence | General) -> _
     end = (nq, None if plain else indices.ctypes.data, others.ctypes.data)
     machine: MachineCode | None = None
     if isinstance(solves, General):
-        handed, room, work = solves.handed.arm, _CANDIDATES, _CANDIDATES
+        c_arm, room, work = solves.c_loop.arm, _CANDIDATES, _CANDIDATES
         own = core.SolverStruct(
-            handed.address, solves.handed.address, *[None] * 3, *[0] * 5, 0.0, NEARLY_SINGULAR, *end
+            c_arm.address, solves.c_loop.address, *[None] * 3, *[0] * 5, 0.0, NEARLY_SINGULAR, *end
         )
     else:
-        machine, handed = machine_code(plain_branches(chain, solves, p)), core.handed_of(arm)
+        machine, c_arm = machine_code(plain_branches(chain, solves, p)), core.c_arm_of(arm)
         if machine is None:
             return None
         arguments, results, integers, reals = machine.work
@@ -231,7 +230,7 @@ def _pose_code(chain: FrameChain, p: Array, solves: StepSequence | General) -> _
         work = arguments + results + integers + reals + 3 * room
         addresses = (machine.evaluate, machine.checkout, machine.release)
         sizes = (room, arguments, results, integers, reals)
-        own = core.SolverStruct(handed.address, None, *addresses, *sizes, *bounds_of(solves), *end)
+        own = core.SolverStruct(c_arm.address, None, *addresses, *sizes, *bounds_of(solves), *end)
     solver = np.frombuffer(memoryview(own).cast("B"), dtype=np.float64)
     inputs = [SX.sym("T", 4, 4), SX.sym("solver", solver.size)]
     room = max(room, 2)  # a single column would be returned as a vector
@@ -240,4 +239,4 @@ def _pose_code(chain: FrameChain, p: Array, solves: StepSequence | General) -> _
     call = array_builtin(signature, core.path_of(library), finite=False, more=work)
     if call is None:
         return None
-    return _PoseCode(call, solver, (own, handed, indices, others, machine, solves))
+    return _PoseCode(call, solver, (own, c_arm, indices, others, machine, solves))

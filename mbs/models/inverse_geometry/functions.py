@@ -317,7 +317,7 @@ def all_configurations(chain: FrameChain) -> AllConfigurations:
                 " mbs.models.inverse_geometry.solve"
             )
         others = np.array(system.position(chain.locked))
-        code = general_function("mbs_igm_all", ready.handed, chain.indices, others, NEARLY_SINGULAR)
+        code = general_function("mbs_igm_all", ready.c_loop, chain.indices, others, NEARLY_SINGULAR)
         T = casadi.MX.sym("T", 4, 4)
         names = [code.name_out(k) for k in range(code.n_out())]
         return AllConfigurations(Function("igm_all", [T], code.call([T]), ["T"], names), chain)

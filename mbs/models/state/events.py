@@ -1,4 +1,4 @@
-"""Events of rigid stops and Coulomb friction in the state equation of the independent joints.
+"""Events of rigid stops, Coulomb friction and components in state equations.
 
 Modes are the limit at which a stop is in contact, and the sliding direction of friction. Limits
 that are not specified have no event indicator.
@@ -16,8 +16,9 @@ from casadi import DM, SX, Function
 from mbs.assembly import System
 from mbs.assembly.tree import position_rate
 from mbs.models.contacts import KINDS, ContactEquations, Contacts, impact, jump
+from mbs.models.state.arguments import StateArguments, spread
 from mbs.models.state.drive import TreeMotion
-from mbs.models.symbols import dense_function, outputs_of
+from mbs.models.symbols import outputs_of
 from mbs.numbers import NONZERO
 from mbs.recursions.parts import PartEvent, after_events
 
@@ -201,21 +202,22 @@ def _write(contacts: Contacts, motion: tuple[SX, SX], acting: tuple[SX, SX], sta
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MinimalEvents:
-    """Event functions of a state equation; p = [parameters; modes] in all of them.
+class StateEvents:
+    """Event functions of a state equation.
 
-    The state x is the state of the independent joints, or of the tree with empty z.
+    They have the arguments of the state equation, "..": (t, x, p) in a simulation and
+    (t, x, z, u, p) in an FMU. The parameters are followed by the modes.
 
     Attributes:
-        modes: names of the modes, such as `stop.mode`.
+        modes: names of the modes, such as `stop.mode`; empty for a mode without stop or friction.
         names: (k) descriptions of the events of the indicators.
-        first: `first(t, x, z, u, p) -> (modes, beyond)` at the start; it does not depend on the
-            modes in p. beyond (k, 1) is positive if x is beyond the limit of the indicator.
-        indicators: `indicators(t, x, z, u, p) -> g`, (k, 1), positive between events.
-        jump: `jump(t, x, z, u, p, fired) -> (x, modes)` after an event; fired (k, 1) is 1 for each
-            indicator that is not positive, else 0.
-        approaches: `approaches(t, x, z, u, p) -> a`, (k, 3) as in `Events` of `mbs.solvers`, or
-            None if all are zero.
+        first: `first(..) -> (modes, beyond)` at the start; it does not depend on the modes in p.
+            beyond (k, 1) is positive if x is beyond the limit of the indicator.
+        indicators: `indicators(..) -> g`, (k, 1), positive between events.
+        jump: `jump(.., fired) -> (x, modes)` after an event; fired (k, 1) is 1 for each indicator
+            that is not positive, else 0.
+        approaches: `approaches(..) -> a`, (k, 3) as in `Events` of `mbs.solvers`, or None if all
+            are zero.
     """
 
     modes: tuple[str, ...]
@@ -241,100 +243,75 @@ class ContactEffort:
     row: int
 
 
-def used_modes(contacts: Contacts) -> list[int]:
-    """Return the indices, among the 2 k modes of k coordinates, of modes with an element."""
-    elements = (*contacts.stops, *contacts.frictions)
-    return [number for number, element in enumerate(elements) if element is not None]
-
-
-def element_names(contacts: Contacts) -> list[str]:
-    """Return the names of the stops, then of the frictions."""
-    elements = (*contacts.stops, *contacts.frictions)
-    return [element.name for element in elements if element is not None]
-
-
-def contact_efforts(system: System, contacts: Contacts) -> tuple[ContactEffort, ...]:
+def contact_efforts(contacts: Contacts) -> tuple[ContactEffort, ...]:
     """Return the effort outputs of the stops, then of the frictions."""
-    elements = (*contacts.stops, *contacts.frictions)
-    found = [(k, element) for k, element in enumerate(elements) if element is not None]
-    return tuple(ContactEffort(f"{element.name}.effort", element.unit, k) for k, element in found)
+    return tuple(
+        ContactEffort(f"{element.name}.effort", element.unit, k) for k, element in contacts.elements
+    )
 
 
-def few_modes(contact: ContactEquations | None, p: SX, values: Sequence[SX]) -> tuple[SX, list[SX]]:
-    """Substitute the used modes for all 2 k modes in expressions.
-
-    Return [p; used modes] and the expressions. Without contacts, return both unchanged.
-    """
-    if contact is None:
-        return p, list(values)
-    modes, count = used_modes(contact.contacts), contact.values.numel()
-    few = SX.sym("modes", len(modes))
-    changed = casadi.substitute(list(values), [contact.values], [_spread(few, modes, count)])
-    return casadi.vertcat(p, few), [SX(value) for value in changed]
-
-
-def minimal_events(
+def contact_events(
+    arguments: StateArguments,
     contact: ContactEquations,
     motion: TreeMotion,
-    point: Sequence[SX],
     jump: Callable[[SX], tuple[SX, SX]],
-) -> MinimalEvents:
-    """Return the contact events of a state equation.
+) -> StateEvents:
+    """Return the events of contacts of a state equation.
+
+    With `arguments.every_mode` the events have all 5 k indicators. Otherwise they have only the
+    indicators that can become zero.
 
     Args:
-        contact: contact equations of the system.
+        arguments: arguments of the event functions.
+        contact: equations of k contacts.
         motion: positions and velocities of the tree.
-        point: symbols t, x, z, u and p, without modes.
         jump: function of fired (5 k, 1), 1 for each indicator that is not positive, that returns x
             and modes (2 k, 1) after an event.
     """
-    contacts, modes = contact.contacts, used_modes(contact.contacts)
+    contacts, elements = contact.contacts, dict(contact.contacts.elements)
     watched = _watch(contacts)
+    if arguments.every_mode:
+        modes, names = list(range(2 * len(contacts))), dict(watched)
+        watched = [(number, names.get(number, "")) for number in range(5 * len(contacts))]
+    else:
+        modes = list(elements)
     numbers = [number for number, _ in watched]
-    *others, p = point
-
-    def written(name: str, extra: list[SX], outputs: list[SX]) -> Function:
-        few, values = few_modes(contact, p, outputs)
-        return dense_function(name, [*others, few, *extra], values)
-
     fired = SX.sym("fired", len(watched))
     start, outside = contacts.first(motion.q, motion.v)
     beyond = casadi.vertcat(outside, -SX.ones(3 * len(contacts)))
-    every = _spread(fired, numbers, 5 * len(contacts))
-    x, now = jump(every)
-    return MinimalEvents(
-        modes=tuple(f"{name}.mode" for name in element_names(contacts)),
+    x, now = jump(spread(fired, numbers, 5 * len(contacts)))
+    return StateEvents(
+        modes=tuple(f"{elements[k].name}.mode" if k in elements else "" for k in modes),
         names=tuple(name for _, name in watched),
-        first=written("first", [], [start[modes], beyond[numbers]]),
-        indicators=written("indicators", [], [contact.indicators[numbers]]),
-        jump=written("jump", [fired], [x, now[modes]]),
+        first=arguments.function("first", [start[modes], beyond[numbers]]),
+        indicators=arguments.function("indicators", [contact.indicators[numbers]]),
+        jump=arguments.function("jump", [x, now[modes]], fired),
     )
 
 
 def join_part_events(
     system: System,
-    contacts: MinimalEvents | None,
+    arguments: StateArguments,
+    contacts: StateEvents | None,
     own: Sequence[PartEvent],
-    point: Sequence[SX],
-) -> MinimalEvents | None:
+) -> StateEvents | None:
     """Append the events of components to the events of contacts.
 
     Args:
         system: open or closed system.
+        arguments: arguments of the event functions. The state ends with the states of components.
         contacts: events of contacts, or None.
         own: events of all components.
-        point: symbols t, x (ends with the states of components), z, u and p, without modes.
     """
     if not own:
         return contacts
-    *others, p = point
-    x, modes = point[1], SX.sym("modes", len(contacts.modes) if contacts else 0)
-    every = [*others, casadi.vertcat(p, modes)]
+    x, modes = arguments.point[1], arguments.modes
     count = len(contacts.names) if contacts else 0
     fired = SX.sym("fired", count + len(own))
     first, beyond = SX(0, 1), SX(0, 1)
     watched, after, now = SX(0, 1), x, modes
     if contacts:
+        every = arguments.symbols
         first, beyond = contacts.first.call(every)
         (watched,) = contacts.indicators.call(every)
         there, changed = contacts.jump.call([*every, fired[:count]])
@@ -344,15 +321,15 @@ def join_part_events(
     after = casadi.vertcat(after[:start], after_events(system, own, fired[count:]))
     indicators = casadi.vertcat(watched, *(event.when for event in own))
     allowed = casadi.vertcat(beyond, -SX.ones(len(own)))
-    return MinimalEvents(
+    return StateEvents(
         modes=contacts.modes if contacts else (),
         names=(
             *(contacts.names if contacts else ()),
             *(f"{event.name} {event.label}" for event in own),
         ),
-        first=dense_function("first", every, [first, allowed]),
-        indicators=dense_function("indicators", every, [indicators]),
-        jump=dense_function("jump", [*every, fired], [after, now]),
+        first=arguments.function("first", [first, allowed]),
+        indicators=arguments.function("indicators", [indicators]),
+        jump=arguments.function("jump", [after, now], fired),
     )
 
 
@@ -389,10 +366,3 @@ def _name(contacts: Contacts, j: int, word: str) -> str:
     if friction is not None and word not in ("lower", "upper"):
         parts.append(f"{friction.name} {f'slides {direction}' if direction else 'stops'}")
     return " or ".join(parts)
-
-
-def _spread(values: SX, indices: Sequence[int], size: int) -> SX:
-    """Return (size, 1) with values at their indices, else zero."""
-    every = SX.zeros(size)
-    every[list(indices)] = values
-    return every

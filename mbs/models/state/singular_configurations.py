@@ -33,8 +33,9 @@ from mbs.loops.velocity import (
 from mbs.models._direct_dynamics import inertia_matrix
 from mbs.models._inverse_dynamics import bias
 from mbs.models.contacts import ContactEquations
-from mbs.models.state.signals import Prescribed, with_inputs
-from mbs.models.symbols import dense_function, outputs_of
+from mbs.models.state.arguments import StateArguments
+from mbs.models.state.signals import Prescribed
+from mbs.models.symbols import outputs_of
 from mbs.solvers.problem import Passage
 
 _DENSE_SIZE = 100
@@ -60,13 +61,11 @@ class ConstraintGroup(NamedTuple):
 
 def passage(
     system: System,
-    point: tuple[SX, SX, SX],
+    arguments: StateArguments,
     tau: SX,
     rates: SX,
     motions: Sequence[Prescribed] = (),
     contact: ContactEquations | None = None,
-    inputs: SX | None = None,
-    given_inputs: SX | None = None,
 ) -> Passage | None:
     """Return the functions for steps through singular configurations of the loops, or None.
 
@@ -75,19 +74,17 @@ def passage(
 
     Args:
         system: open or closed system.
-        point: symbols t, x = [q; v; z] and p, without modes.
+        arguments: arguments of the functions, with the state x = [q; v; z].
         tau: (nv, 1) joint efforts, without prescribed motions and contacts.
         rates: (nz, 1) rates of the states z of components.
         motions: coordinates with prescribed motions.
         contact: equations of rigid stops and Coulomb friction, or None.
-        inputs: inputs u. If given, the functions take (t, x, z, u, p) with empty z.
-        given_inputs: (nu, 1) values that replace the inputs of components, or None.
     """
     if system.closure is None or system.closure.slips:
         return None
     if any(motion.position is None for motion in motions):
         return None
-    t, x, p = point
+    t, x, *_ = arguments.point
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     loops = _loop_group(system, q, v)
     if loops is None:
@@ -103,20 +100,16 @@ def passage(
     rows = casadi.substitute([casadi.densify(row) for row in rows], [q, v], [q_now, v_now])
     efforts = _with_sliding_friction(tau, contact)
     forces = [*_inertia_and_forces(system, q_now, v_now, efforts), rates]
-    if given_inputs is not None:
-        forces = with_inputs(system, forces, given_inputs)
     # distance from singular configurations
     measure = _regularity(system, q, drives.J)
     typical = _typical_regularity(system, q, measure)
     regularity = casadi.substitute(measure, q, q_now)
     if contact is not None:
-        p = casadi.vertcat(p, contact.values)
         regularity = _regular_while_sticking(contact, regularity, typical)
-    at = [t, x, p] if inputs is None else [t, x, SX.sym("z", 0), inputs, p]
     return Passage(
-        rows=_function_with_sparse_outputs("rows", at, rows),
-        forces=_function_with_sparse_outputs("forces", at, forces),
-        regularity=dense_function("regularity", at, [regularity]),
+        rows=_function_with_sparse_outputs("rows", arguments, rows),
+        forces=_function_with_sparse_outputs("forces", arguments, forces),
+        regularity=arguments.function("regularity", [regularity]),
         size=(
             system.nq,
             system.nv,
@@ -130,12 +123,12 @@ def passage(
     )
 
 
-def without_passages(system: System, point: list[SX]) -> Passage:
+def without_passages(system: System, arguments: StateArguments) -> Passage:
     """Return placeholder functions without constraints; every configuration counts as regular.
 
     Args:
         system: open or closed system.
-        point: symbols t, x, z, u and p of the functions.
+        arguments: arguments of the functions.
     """
     nq, nv, nz = system.nq, system.nv, system.z.numel()
     wide = nq > nv  # the system has unit quaternions
@@ -151,9 +144,9 @@ def without_passages(system: System, point: list[SX]) -> Passage:
     )
     forces = [SX.zeros(nv, nv), SX.zeros(nv), SX.zeros(nz)]
     return Passage(
-        rows=dense_function("rows", point, list(rows)),
-        forces=dense_function("forces", point, forces),
-        regularity=dense_function("regularity", point, [SX(1)]),
+        rows=arguments.function("rows", list(rows)),
+        forces=arguments.function("forces", forces),
+        regularity=arguments.function("regularity", [SX(1)]),
         size=(nq, nv, nz, 0, 0, 0, 0),
         typical=1.0,
     )
@@ -328,12 +321,12 @@ def _regular_while_sticking(contact: ContactEquations, regularity: SX, typical: 
 
 
 def _function_with_sparse_outputs(
-    name: str, inputs: Sequence[SX], outputs: Sequence[SX]
+    name: str, arguments: StateArguments, outputs: Sequence[SX]
 ) -> Function:
     """Return a Function with dense outputs, except for large outputs that are mostly zero."""
-    values = [casadi.densify(value) for value in outputs]
+    values = [casadi.densify(value) for value in arguments.values(outputs)]
     for k, value in enumerate(values):
         few = casadi.sparsify(value)
         if value.numel() > _DENSE_SIZE and 2 * few.nnz() < value.numel():
             values[k] = few
-    return Function(name, list(inputs), values, {"cse": True})
+    return Function(name, arguments.symbols, values, {"cse": True})

@@ -6,14 +6,14 @@ from support.catalogue_systems import catalogue_system
 from mbs.closed_forms import arm_core
 from mbs.closed_forms.arm import Arm, gap_to, motion
 from mbs.closed_forms.arm_search import general_many, general_of
-from mbs.closed_forms.raghavan_roth import prepare
-from mbs.closed_forms.raghavan_roth.numbers import (
+from mbs.closed_forms.displacement_matrices import (
     back_parts,
+    frame_products,
     half_parts,
     motion_parts,
-    pair,
     rho,
 )
+from mbs.closed_forms.raghavan_roth import prepare
 from mbs.errors import ModelError, NoClosedForm
 from mbs.models.inverse_geometry.chain import frame_chain
 
@@ -83,7 +83,7 @@ def distinct(arm, q, tolerance=1e-5):
 
 def candidates(arm, T):
     """Configurations that may reach a pose, before they are polished and checked."""
-    return arm_core.candidates_by(arm_core.core(), general_of(arm).handed, T)
+    return arm_core.candidates_by(arm_core.core(), general_of(arm).c_loop, T)
 
 
 def candidates_many(arm, T):
@@ -122,7 +122,9 @@ def random_poses(rng, count):
 def test_pairs_move_by_a_representation():
     A, B = random_poses(np.random.default_rng(1), 10).reshape(2, 5, 4, 4)
     np.testing.assert_allclose(rho(A) @ rho(B), rho(A @ B), atol=1e-11)
-    np.testing.assert_allclose((rho(A) @ pair(B)[..., None])[..., 0], pair(A @ B), atol=1e-11)
+    np.testing.assert_allclose(
+        (rho(A) @ frame_products(B)[..., None])[..., 0], frame_products(A @ B), atol=1e-11
+    )
 
 
 @pytest.mark.parametrize("slides", [False, True])

@@ -1,9 +1,9 @@
 #include "closure.h"
 
-#include "core.h"
-
 #include <math.h>
 #include <string.h>
+
+#include "references.h"
 
 #if NZ > 0
 
@@ -117,8 +117,7 @@ static int follow(const loops *l, const real *x, real *z) {
     int i, known = 0, status;
     for (i = 0; i < NZ; i++) slope[i] = REAL(0.0);
     for (i = 0; i < NX; i++)
-        if (MODEL_LEADS[i])
-            length = real_max(length, real_abs(x[i] - from[i]) / size[STATES + i]);
+        if (MODEL_LEADS[i]) length = real_max(length, real_abs(x[i] - from[i]) / size[STATES + i]);
     largest = real_min(REAL(1.0), STRIDE / real_max(length, STRIDE));
     part = length > REAL(0.0) ? FIRST * largest : REAL(1.0);
     memcpy(z, l->z, sizeof trial);
@@ -164,12 +163,15 @@ static int from_start(const loops *l, const real *x, real *z) {
     return newton(l, x, z, UNBOUNDED);
 }
 
+/* Whether dependent coordinate i has a guess. */
 static int guessed(const loops *l, int i) { return l->guess[i] != MODEL_START[DEPENDENTS + i]; }
 
 #if NCUT > 0
+/* Whether position i of the cut joints has a guess. */
 static int cut_guessed(const loops *l, int i) { return l->cut[i] != MODEL_START[CUTS + i]; }
 #endif
 
+/* Whether a dependent coordinate or a cut joint has a guess. */
 static int any_guessed(const loops *l) {
     int i;
     for (i = 0; i < NZ; i++)
@@ -211,7 +213,8 @@ static real cut_distance(const loops *l, const real *x, const real *z) {
     }
     for (i = 0; i < NCUT; i++)
         if (cut_guessed(l, i))
-            far = real_max(far, real_abs(difference(NZ + i, at[i], l->cut[i])) / MODEL_SPANS[NZ + i]);
+            far =
+                real_max(far, real_abs(difference(NZ + i, at[i], l->cut[i])) / MODEL_SPANS[NZ + i]);
 #else
     (void)l, (void)x, (void)z;
 #endif
@@ -274,7 +277,8 @@ static void trial_start(const loops *l, int k, const real *near, real *z) {
         z[i] = l->guess[i];
         if (k == 1 && !guessed(l, i)) z[i] = near[i];
         if (k > 1 && (k % 2 || !guessed(l, i)))
-            z[i] += (MODEL_TURNS[i] ? HALF_TURN : MODEL_SPANS[i]) * scattered((unsigned)k, (unsigned)i);
+            z[i] +=
+                (MODEL_TURNS[i] ? HALF_TURN : MODEL_SPANS[i]) * scattered((unsigned)k, (unsigned)i);
     }
 }
 

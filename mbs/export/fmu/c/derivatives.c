@@ -1,40 +1,42 @@
 /* Directional and adjoint derivatives and time derivatives, exact also for closed loops. */
-#include "internal.h"
-
-#include "charts.h"
-
 #include <math.h>
 #include <string.h>
+
+#include "calculated.h"
+#include "charts.h"
+#include "core.h"
 
 /* Seeds, or derivatives, of time, states, inputs, parameters and all calculated values. */
 typedef struct {
     double dt, dx[NX + 1], du[NU + 1], dp[NP + 1];
-    double dslot[NX + 1], drate[NX + 1]; /* states of the external integrator, their rates */
+    double dchart[NX + 1], drate[NX + 1]; /* states of the external integrator, their rates */
     double dxdot[NX + 1], dy[NY + 1], dm[NM + 1], dz[NZ + 1], dg[NK + 1];
 } tangents;
 
 /* Whether the states of the external integrator are local tangent coordinates. */
-static int in_chart(const core *c) {
+static int in_chart(const core_solver *s) {
 #if MODEL_TREE_OUTSIDE
-    return !c->m.cosimulation && (c->m.mode & RUNNING) && c->m.charts.tangent;
+    const core_run *run = s->machine->run;
+    return !run->cosimulation && (run->mode & RUNNING) && s->charts->tangent;
 #else
-    (void)c;
+    (void)s;
     return 0;
 #endif
 }
 
 /* Address of the seed of a value reference, or NULL if derivatives by it do not exist. */
 static double *known_of(const core *c, tangents *d, core_reference ref) {
-    if (ref == TIME_REFERENCE && c->timed) return &d->dt;
-    if (ref < DERIVATIVES) return in_chart(c) ? NULL : d->dx + (ref - STATES);
+    if (ref == TIME_REFERENCE && c->host.timed) return &d->dt;
+    if (ref < DERIVATIVES) return in_chart(&c->solver) ? NULL : d->dx + (ref - STATES);
     if (ref < INPUTS) return NULL;
     if (ref < OUTPUTS) return d->du + (ref - INPUTS);
     if (ref < PARAMETERS) return NULL;
     if (ref < MODES) return d->dp + (ref - PARAMETERS);
-    if (ref < SLOTS) return NULL;
-    return ref < RATES ? d->dslot + (ref - SLOTS) : NULL;
+    if (ref < CHART_STATES) return NULL;
+    return ref < CHART_RATES ? d->dchart + (ref - CHART_STATES) : NULL;
 }
 
+/* Address of the derivative of a value reference, or NULL if it has none. */
 static double *unknown_of(tangents *d, core_reference ref) {
     if (ref < DERIVATIVES) return d->dx + (ref - STATES);
     if (ref < INPUTS) return d->dxdot + (ref - DERIVATIVES);
@@ -43,9 +45,23 @@ static double *unknown_of(tangents *d, core_reference ref) {
     if (ref < MODES) return NULL;
     if (ref < DEPENDENTS) return d->dm + (ref - MODES); /* constant */
     if (ref < INDICATORS) return d->dz + (ref - DEPENDENTS);
-    if (ref < SLOTS) return d->dg + (ref - INDICATORS);
-    if (ref < RATES) return d->dslot + (ref - SLOTS);
-    return ref < CHART ? d->drate + (ref - RATES) : NULL;
+    if (ref < CHART_STATES) return d->dg + (ref - INDICATORS);
+    if (ref < CHART_RATES) return d->dchart + (ref - CHART_STATES);
+    return ref < CHART_INDICATOR ? d->drate + (ref - CHART_RATES) : NULL;
+}
+
+/* Compute the directional derivatives of all calculated values along the seeds in d, at the point
+ * in the arguments. Nonzero on failure. */
+static int directional(machine *m, tangents *d) {
+    m->arg[5] = &d->dt;
+    m->arg[6] = d->dx;
+    m->arg[7] = d->du;
+    m->arg[8] = d->dp;
+    m->res[0] = d->dxdot;
+    m->res[1] = d->dy;
+    m->res[2] = d->dz;
+    m->res[3] = d->dg;
+    return machine_call(m, mbs_tangent);
 }
 
 #ifdef MODEL_SINES
@@ -55,7 +71,7 @@ static double *unknown_of(tangents *d, core_reference ref) {
 /* Displacement of the states in the test of rounding, in nominal sizes. It changes exact
  * derivatives by about this fraction, and derivatives without accuracy by more. */
 #define TRIAL_MOVE 1e-12
-#define TRIALS 3
+#define TRIAL_MOVES 3
 /* Largest effect of rounding, relative to the derivatives. */
 #define ROUNDING 1e-5
 /* Largest effect of rounding on derivatives that are zero, relative to squared speeds in nominal
@@ -64,38 +80,27 @@ static double *unknown_of(tangents *d, core_reference ref) {
 
 /* Compute the derivative of the accelerations along a direction of all states, in nominal sizes, at
  * a configuration displaced by trial move number `trial`. Velocities stay those of the state. */
-static int trial_accelerations(core *c, int trial, double *accelerations) {
-    static const double MOVES[TRIALS] = {-TRIAL_MOVE, TRIAL_MOVE, 2.0 * TRIAL_MOVE};
+static int trial_accelerations(machine *m, int trial, double *accelerations) {
+    static const double MOVES[TRIAL_MOVES] = {-TRIAL_MOVE, TRIAL_MOVE, 2.0 * TRIAL_MOVE};
     const double *nominal = MODEL_NOMINAL;
-    double x[NX + 1], z[NZ + 1], next[NZ + 1], residual, none;
+    double x[NX + 1], z[NZ + 1], next[NZ + 1], residual;
     tangents d;
     int i, pass;
     memset(&d, 0, sizeof d);
     for (i = 0; i < NX; i++) {
-        x[i] = c->m.values[STATES + i] + (MODEL_LEADS[i] ? MOVES[trial] * nominal[STATES + i] : 0.0);
+        x[i] = m->values[STATES + i] + (MODEL_LEADS[i] ? MOVES[trial] * nominal[STATES + i] : 0.0);
         d.dx[i] = nominal[STATES + i] * (1.0 + (double)i / NX);
     }
-    memcpy(z, c->m.values + DEPENDENTS, NZ * sizeof *z);
+    memcpy(z, m->values + DEPENDENTS, NZ * sizeof *z);
     for (pass = 0; pass < 2; pass++) {
-        c->arg[0] = x;
-        c->arg[1] = z;
-        c->arg[2] = c->m.values + PARAMETERS;
-        c->res[0] = next;
-        c->res[1] = &residual;
-        if (mbs_closure(c->arg, c->res, c->iw, c->w, 0)) return 1;
+        machine_loop_point(m, x, z);
+        m->res[0] = next;
+        m->res[1] = &residual;
+        if (machine_call(m, mbs_closure)) return 1;
         memcpy(z, next, NZ * sizeof *z);
     }
-    core_point(c, &c->m.time, x, z);
-    c->arg[5] = &none;
-    none = 0.0;
-    c->arg[6] = d.dx;
-    c->arg[7] = d.du;
-    c->arg[8] = d.dp;
-    c->res[0] = d.dxdot;
-    c->res[1] = d.dy;
-    c->res[2] = d.dz;
-    c->res[3] = d.dg;
-    if (mbs_tangent(c->arg, c->res, c->iw, c->w, 0)) return 1;
+    machine_point(m, &m->run->time, x, z);
+    if (directional(m, &d)) return 1;
     for (i = 0; i < NX; i++) accelerations[i] = d.dxdot[i] / nominal[STATES + i];
     for (i = 0; i < N_PASSIVE; i++)
         accelerations[NX + i] = d.dy[PASSIVE_A + i] / nominal[OUTPUTS + PASSIVE_A + i];
@@ -103,19 +108,20 @@ static int trial_accelerations(core *c, int trial, double *accelerations) {
 }
 
 /* Whether derivatives are independent of rounding errors of the dependent positions. */
-static int is_accurate(core *c) {
-    double found[TRIALS][NX + N_PASSIVE + 1], size = 0.0, difference = 0.0, speed = 0.0;
+static int is_accurate(machine *m) {
+    double found[TRIAL_MOVES][NX + N_PASSIVE + 1], size = 0.0, difference = 0.0, speed = 0.0;
     int i, k;
-    for (k = 0; k < TRIALS; k++)
-        if (trial_accelerations(c, k, found[k])) return 0;
+    for (k = 0; k < TRIAL_MOVES; k++)
+        if (trial_accelerations(m, k, found[k])) return 0;
     for (i = 0; i < NX + N_PASSIVE; i++) {
         size = fmax(size, fabs(found[0][i]));
-        for (k = 1; k < TRIALS; k++) difference = fmax(difference, fabs(found[k][i] - found[0][i]));
+        for (k = 1; k < TRIAL_MOVES; k++)
+            difference = fmax(difference, fabs(found[k][i] - found[0][i]));
     }
     for (i = 0; i < NX; i++)
-        speed = fmax(speed, fabs(c->m.values[DERIVATIVES + i]) / MODEL_NOMINAL[STATES + i]);
+        speed = fmax(speed, fabs(m->values[DERIVATIVES + i]) / MODEL_NOMINAL[STATES + i]);
     for (i = 0; i < N_PASSIVE; i++)
-        speed = fmax(speed, fabs(c->m.values[OUTPUTS + PASSIVE_V + i]) /
+        speed = fmax(speed, fabs(m->values[OUTPUTS + PASSIVE_V + i]) /
                                 MODEL_NOMINAL[OUTPUTS + PASSIVE_V + i]);
     return difference <= ROUNDING * size + ROUNDING_OF_SPEEDS * speed * speed;
 }
@@ -124,75 +130,75 @@ static int is_accurate(core *c) {
 
 /* Check that derivatives are accurate. Second derivatives of the loops magnify rounding errors of a
  * closed configuration by the third power of the inverse sine, and by squared speeds. */
-static core_status differentiable(core *c) {
+static core_status differentiable(core_solver *s) {
 #ifdef MODEL_SINES
+    machine *m = s->machine;
     double sines[2], sine;
-    c->arg[0] = c->m.values + STATES;
-    c->arg[1] = c->m.values + DEPENDENTS;
-    c->arg[2] = c->m.values + PARAMETERS;
-    c->res[0] = sines;
-    if (mbs_sines(c->arg, c->res, c->iw, c->w, 0)) sines[0] = sines[1] = 0.0;
-    sine = sines[in_chart(c)];
-    if (sine > ROUNDED || (sine > MODEL_SINES && (in_chart(c) || is_accurate(c)))) return CORE_OK;
-    return core_not_differentiable(c, sqrt(fmax(sine, 0.0)));
+    int chart = in_chart(s);
+    machine_loop_point(m, m->values + STATES, m->values + DEPENDENTS);
+    m->res[0] = sines;
+    if (machine_call(m, mbs_sines)) sines[0] = sines[1] = 0.0;
+    sine = sines[chart];
+    if (sine > ROUNDED || (sine > MODEL_SINES && (chart || is_accurate(m)))) return CORE_OK;
+    return machine_not_differentiable(m, sqrt(fmax(sine, 0.0)));
 #else
-    (void)c;
+    (void)s;
     return CORE_OK;
 #endif
 }
 
-core_status core_not_differentiable(core *c, double sine) {
-    return core_refuse(c, "%s: at time %.9g the configuration is so near a singular one (%s; sine %.2g) "
-                       "that second derivatives of the loops have no accuracy at these velocities; ask "
-                       "for derivatives at another configuration, at smaller velocities, or choose "
-                       "other independent joints (assemble(active=...))", c->name, c->m.time,
-                       core_where(c), sine);
-}
-
 /* Check references and seeds, and update the calculated values. */
-static core_status ready(core *c, const core_reference *unknown, size_t n_unknown, const core_reference *known,
-                         size_t n_known, const double *seed, size_t n_seed) {
+static core_status ready(core *c, const core_reference *unknown, size_t n_unknown,
+                         const core_reference *known, size_t n_known, const double *seed,
+                         size_t n_seed) {
     core_status status;
     tangents d;
     size_t i;
-    if (!core_allowed(c, INITIALIZATION | RUNNING | INTERMEDIATE, "a derivative"))
+    if (!log_allowed(&c->log, INITIALIZATION | RUNNING | INTERMEDIATE, "a derivative"))
         return CORE_ERROR;
     for (i = 0; i < n_known; i++)
         if (!known_of(c, &d, known[i]))
-            return core_refuse(c, "%s: no derivative with respect to value reference %u; use "
-                               "states, inputs and parameters", c->name, (unsigned)known[i]);
+            return log_error(&c->log,
+                             "no derivative with respect to value reference %u; use "
+                             "states, inputs and parameters",
+                             (unsigned)known[i]);
     for (i = 0; i < n_unknown; i++)
         if (!unknown_of(&d, unknown[i]))
-            return core_refuse(c, "%s: value reference %u has no derivative; use outputs and "
-                               "derivatives of states", c->name, (unsigned)unknown[i]);
+            return log_error(&c->log,
+                             "value reference %u has no derivative; use outputs and "
+                             "derivatives of states",
+                             (unsigned)unknown[i]);
     for (i = 0; i < n_seed; i++)
         if (!isfinite(seed[i]))
-            return core_refuse(c, "%s: seed %g of a derivative is not finite", c->name, seed[i]);
-    status = core_refresh(c);
-    return status ? status : differentiable(c);
+            return log_error(&c->log, "seed %g of a derivative is not finite", seed[i]);
+    status = calculate(&c->solver);
+    return status ? status : differentiable(&c->solver);
 }
 
-static void point(core *c) {
-    core_point(c, &c->m.time, c->m.values + STATES, c->m.values + DEPENDENTS);
+/* Set the arguments of the generated functions to the present values. */
+static void present_point(machine *m) {
+    machine_point(m, &m->run->time, m->values + STATES, m->values + DEPENDENTS);
 }
 
-static core_status finite_answer(core *c, core_reference ref, double value) {
+/* Error if a derivative of or by a variable is not finite. */
+static core_status finite_answer(core_log *l, core_reference ref, double value) {
     if (isfinite(value)) return CORE_OK;
-    return core_no_answer(c, "%s: the derivative of or by %s is not finite at time %.9g", c->name,
-                          ref < N_VALUES ? MODEL_NAMES[ref] : "time", c->m.time);
+    return log_failed(l, "the derivative of or by %s is not finite at time %.9g",
+                      ref < N_VALUES ? MODEL_NAMES[ref] : "time", l->run->time);
 }
 
 #if MODEL_TREE_OUTSIDE
 
-static core_status move_in_chart(core *c, tangents *d) {
+/* The same while the states are local tangent coordinates. */
+static core_status move_in_chart(core_solver *s, tangents *d) {
     charts_tangent along;
     core_status status;
     memset(&along, 0, sizeof along);
     along.dt = d->dt;
-    memcpy(along.dx, d->dslot, sizeof d->dslot);
+    memcpy(along.dx, d->dchart, sizeof d->dchart);
     memcpy(along.du, d->du, sizeof d->du);
     memcpy(along.dp, d->dp, sizeof d->dp);
-    status = charts_difference(c, &along);
+    status = charts_difference(s, &along);
     memcpy(d->drate, along.dxdot, sizeof d->drate);
     memcpy(d->dx, along.djoints, sizeof d->dx);
     memcpy(d->dxdot, along.dslopes, sizeof d->dxdot);
@@ -204,23 +210,15 @@ static core_status move_in_chart(core *c, tangents *d) {
 #endif
 
 /* Compute the directional derivatives of all calculated values along the seeds in d. */
-static core_status move(core *c, tangents *d) {
+static core_status move(core_solver *s, tangents *d) {
+    machine *m = s->machine;
     int i;
 #if MODEL_TREE_OUTSIDE
-    if (in_chart(c)) return move_in_chart(c, d);
+    if (in_chart(s)) return move_in_chart(s, d);
 #endif
-    for (i = 0; i < NX; i++) d->dx[i] += d->dslot[i];
-    point(c);
-    c->arg[5] = &d->dt;
-    c->arg[6] = d->dx;
-    c->arg[7] = d->du;
-    c->arg[8] = d->dp;
-    c->res[0] = d->dxdot;
-    c->res[1] = d->dy;
-    c->res[2] = d->dz;
-    c->res[3] = d->dg;
-    if (mbs_tangent(c->arg, c->res, c->iw, c->w, 0))
-        return core_no_answer(c, "%s: no derivative at time %.9g", c->name, c->m.time);
+    for (i = 0; i < NX; i++) d->dx[i] += d->dchart[i];
+    present_point(m);
+    if (directional(m, d)) return log_failed(m->log, "no derivative at time %.9g", m->run->time);
     memcpy(d->drate, d->dxdot, sizeof d->drate);
     return CORE_OK;
 }
@@ -234,10 +232,10 @@ core_status core_directional(core *c, const core_reference *unknown, size_t n_un
     if (status) return status;
     memset(&d, 0, sizeof d);
     for (i = 0; i < n_known; i++) *known_of(c, &d, known[i]) += seed[i];
-    status = move(c, &d);
+    status = move(&c->solver, &d);
     for (i = 0; i < n_unknown && !status; i++) {
         answer[i] = *unknown_of(&d, unknown[i]);
-        status = finite_answer(c, unknown[i], answer[i]);
+        status = finite_answer(&c->log, unknown[i], answer[i]);
     }
     return status;
 }
@@ -254,11 +252,11 @@ static core_status transposed(core *c, const core_reference *unknown, size_t n_u
     for (i = 0; i < n_known && !status; i++) {
         memset(&d, 0, sizeof d);
         *known_of(c, &d, known[i]) = 1.0;
-        status = move(c, &d);
+        status = move(&c->solver, &d);
         answer[i] = 0.0;
         for (k = 0; k < n_unknown && !status; k++)
             answer[i] += seed[k] * *unknown_of(&d, unknown[k]);
-        if (!status) status = finite_answer(c, known[i], answer[i]);
+        if (!status) status = finite_answer(&c->log, known[i], answer[i]);
     }
     return status;
 }
@@ -266,33 +264,35 @@ static core_status transposed(core *c, const core_reference *unknown, size_t n_u
 core_status core_adjoint(core *c, const core_reference *unknown, size_t n_unknown,
                          const core_reference *known, size_t n_known, const double *seed,
                          double *answer) {
+    machine *m = &c->machine;
     tangents w, g;
     size_t i;
     core_status status = ready(c, unknown, n_unknown, known, n_known, seed, n_unknown);
     if (status) return status;
-    if (in_chart(c)) return transposed(c, unknown, n_unknown, known, n_known, seed, answer);
+    if (in_chart(&c->solver))
+        return transposed(c, unknown, n_unknown, known, n_known, seed, answer);
     memset(&w, 0, sizeof w);
     for (i = 0; i < n_unknown; i++) *unknown_of(&w, unknown[i]) += seed[i];
     for (i = 0; i < NX; i++) {
-        w.dx[i] += w.dslot[i];
+        w.dx[i] += w.dchart[i];
         w.dxdot[i] += w.drate[i];
     }
-    point(c);
-    c->arg[5] = w.dxdot;
-    c->arg[6] = w.dy;
-    c->arg[7] = w.dz;
-    c->arg[8] = w.dg;
-    c->res[0] = &g.dt;
-    c->res[1] = g.dx;
-    c->res[2] = g.du;
-    c->res[3] = g.dp;
-    if (mbs_adjoint(c->arg, c->res, c->iw, c->w, 0))
-        return core_no_answer(c, "%s: no derivative at time %.9g", c->name, c->m.time);
+    present_point(m);
+    m->arg[5] = w.dxdot;
+    m->arg[6] = w.dy;
+    m->arg[7] = w.dz;
+    m->arg[8] = w.dg;
+    m->res[0] = &g.dt;
+    m->res[1] = g.dx;
+    m->res[2] = g.du;
+    m->res[3] = g.dp;
+    if (machine_call(m, mbs_adjoint))
+        return log_failed(m->log, "no derivative at time %.9g", m->run->time);
     for (i = 0; i < NX; i++) g.dx[i] += w.dx[i]; /* a state may be an output */
-    memcpy(g.dslot, g.dx, sizeof g.dslot);
+    memcpy(g.dchart, g.dx, sizeof g.dchart);
     for (i = 0; i < n_known && !status; i++) {
         answer[i] = *known_of(c, &g, known[i]);
-        status = finite_answer(c, known[i], answer[i]);
+        status = finite_answer(&c->log, known[i], answer[i]);
     }
     return status;
 }
@@ -300,27 +300,26 @@ core_status core_adjoint(core *c, const core_reference *unknown, size_t n_unknow
 #endif
 
 /* Time derivatives of outputs. Inputs follow their given derivatives, else they are constant. */
-core_status core_get_output_slopes(core *c, const core_reference *ref, size_t n, const core_integer *order,
-                                   double *values) {
+core_status core_get_output_slopes(core *c, const core_reference *ref, size_t n,
+                                   const core_integer *order, double *values) {
     core_status status;
     tangents d;
     size_t i;
-    if (n && (!ref || !order || !values))
-        return core_refuse(c, "%s: the array is NULL", c->name);
+    if (n && (!ref || !order || !values)) return log_error(&c->log, "the array is NULL");
     status = ready(c, ref, n, NULL, 0, NULL, 0);
     if (status) return status;
     for (i = 0; i < n; i++)
         if (order[i] != 1)
-            return core_refuse(c, "%s: derivative %d of %s is not known; use order 1", c->name,
-                               (int)order[i], MODEL_NAMES[ref[i]]);
+            return log_error(&c->log, "derivative %d of %s is not known; use order 1",
+                             (int)order[i], MODEL_NAMES[ref[i]]);
     memset(&d, 0, sizeof d);
     d.dt = 1.0;
-    memcpy(d.dx, c->m.values + DERIVATIVES, sizeof d.dx - sizeof *d.dx);
-    core_input_rates(c, c->m.time, d.du);
-    status = move(c, &d);
+    memcpy(d.dx, c->m.variables.values + DERIVATIVES, sizeof d.dx - sizeof *d.dx);
+    machine_input_rates(&c->machine, c->m.run.time, d.du);
+    status = move(&c->solver, &d);
     for (i = 0; i < n && !status; i++) {
         values[i] = *unknown_of(&d, ref[i]);
-        status = finite_answer(c, ref[i], values[i]);
+        status = finite_answer(&c->log, ref[i], values[i]);
     }
     return status;
 }

@@ -1,4 +1,4 @@
-/* FMI 2.0 interface to core.c, for model exchange and co-simulation. */
+/* FMI 2.0 interface to core.h, for model exchange and co-simulation. */
 #include "fmi2_face.h"
 
 #include <math.h>
@@ -20,12 +20,12 @@ static fmi2Status as_fmi(core_status status) {
 static void forward_log(void *host, const char *name, core_status status, const char *message) {
     face *f = host;
     if (f->logger)
-        f->logger(f->environment, name, as_fmi(status), core_category(status), "%s", message);
+        f->logger(f->environment, name, as_fmi(status), log_category(status), "%s", message);
 }
 
 static fmi2Status refused(fmi2Component c, const char *message) {
     NEED(c);
-    return as_fmi(core_refuse(MODEL(c), "%s: %s", MODEL(c)->name, message));
+    return as_fmi(log_error(&MODEL(c)->log, "%s", message));
 }
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
@@ -77,7 +77,8 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     (void)resources, (void)visible;
     if (!name || !*name) return no_instance(functions, "?", "the instance has no name");
     if (!guid || strcmp(guid, MODEL_GUID))
-        return no_instance(functions, name, "the GUID is not the one of this model: the model "
+        return no_instance(functions, name,
+                           "the GUID is not the one of this model: the model "
                            "description and the library belong to different FMUs");
     if (type != fmi2ModelExchange && type != fmi2CoSimulation)
         return no_instance(functions, name, "the type of the instance is unknown");
@@ -85,7 +86,8 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     if (type != fmi2CoSimulation)
         return no_instance(functions, name, "the model is for co-simulation alone");
     if (!functions || !functions->allocateMemory || !functions->freeMemory)
-        return no_instance(functions, name, "the model has memory by callbacks alone; give it "
+        return no_instance(functions, name,
+                           "the model has memory by callbacks alone; give it "
                            "allocateMemory and freeMemory");
 #endif
     f = new_face(functions, INSTANCE_SIZE(strlen(name)));
@@ -100,7 +102,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
         fmi2FreeInstance(f);
         return no_instance(functions, name, "no memory is left");
     }
-    f->model.discards = logging != fmi2False;
+    f->model.log.discards = logging != fmi2False;
     return f;
 }
 
@@ -113,7 +115,7 @@ void fmi2FreeInstance(fmi2Component c) {
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n,
                                const fmi2String categories[]) {
     NEED(c);
-    return as_fmi(core_set_logging(MODEL(c), on, categories, n));
+    return as_fmi(log_select(&MODEL(c)->log, on, categories, n));
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance,
@@ -123,8 +125,11 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, f
                              stop_defined ? stop : HUGE_VAL));
 }
 
-#define FORWARD(name, call) \
-    fmi2Status name(fmi2Component c) { NEED(c); return as_fmi(call(MODEL(c))); }
+#define FORWARD(name, call)            \
+    fmi2Status name(fmi2Component c) { \
+        NEED(c);                       \
+        return as_fmi(call(MODEL(c))); \
+    }
 
 FORWARD(fmi2EnterInitializationMode, core_enter_initialization)
 FORWARD(fmi2ExitInitializationMode, core_exit_initialization)
@@ -163,16 +168,16 @@ static fmi2Status none(fmi2Component c, size_t n, const char *message) {
     return n ? refused(c, message) : fmi2OK;
 }
 
-#define NO_VARIABLES(type, text)                                                         \
-    fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference vr[], size_t n,   \
-                             fmi2##type value[]) {                                       \
-        (void)vr, (void)value;                                                           \
-        return none(c, n, "the model has no " text " variables");                        \
-    }                                                                                    \
-    fmi2Status fmi2Set##type(fmi2Component c, const fmi2ValueReference vr[], size_t n,   \
-                             const fmi2##type value[]) {                                 \
-        (void)vr, (void)value;                                                           \
-        return none(c, n, "the model has no " text " variables");                        \
+#define NO_VARIABLES(type, text)                                                       \
+    fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference vr[], size_t n, \
+                             fmi2##type value[]) {                                     \
+        (void)vr, (void)value;                                                         \
+        return none(c, n, "the model has no " text " variables");                      \
+    }                                                                                  \
+    fmi2Status fmi2Set##type(fmi2Component c, const fmi2ValueReference vr[], size_t n, \
+                             const fmi2##type value[]) {                               \
+        (void)vr, (void)value;                                                         \
+        return none(c, n, "the model has no " text " variables");                      \
     }
 
 NO_VARIABLES(Boolean, "boolean")
@@ -218,8 +223,7 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
 
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknown[],
                                         size_t n_unknown, const fmi2ValueReference known[],
-                                        size_t n_known, const fmi2Real seed[],
-                                        fmi2Real answer[]) {
+                                        size_t n_known, const fmi2Real seed[], fmi2Real answer[]) {
     NEED(c);
     if ((n_unknown && (!unknown || !answer)) || (n_known && (!known || !seed)))
         return refused(c, "an array of the derivative is NULL");
@@ -245,8 +249,7 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set_befor
     int event;
     NEED(c);
     (void)no_set_before;
-    if (!enter_event_mode || !terminate)
-        return refused(c, "a flag of the completed step is NULL");
+    if (!enter_event_mode || !terminate) return refused(c, "a flag of the completed step is NULL");
     *enter_event_mode = *terminate = fmi2False;
     status = core_completed_step(MODEL(c), &event);
     *enter_event_mode = event != 0;
@@ -263,10 +266,10 @@ fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n
     return as_fmi(core_set_states(MODEL(c), x, n));
 }
 
-#define VECTOR(name, call)                                   \
+#define VECTOR(name, call)                                     \
     fmi2Status name(fmi2Component c, fmi2Real v[], size_t n) { \
-        NEED(c);                                             \
-        return as_fmi(call(MODEL(c), v, n));                 \
+        NEED(c);                                               \
+        return as_fmi(call(MODEL(c), v, n));                   \
     }
 
 VECTOR(fmi2GetContinuousStates, core_get_states)
@@ -307,7 +310,7 @@ static fmi2Status no_status(fmi2Component c) {
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value) {
     NEED(c);
     if (kind != fmi2LastSuccessfulTime || !value) return no_status(c);
-    *value = MODEL(c)->m.time;
+    *value = MODEL(c)->m.run.time;
     return fmi2OK;
 }
 

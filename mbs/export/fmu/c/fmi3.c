@@ -1,4 +1,4 @@
-/* FMI 3.0 interface to core.c, part 1: instances and values, model exchange and co-simulation. */
+/* FMI 3.0 interface to core.h, part 1: instances and values, model exchange and co-simulation. */
 #include <math.h>
 #include <string.h>
 
@@ -8,14 +8,14 @@
 static void forward_log(void *host, const char *name, core_status status, const char *message) {
     face *f = host;
     (void)name;
-    if (f->logger) f->logger(f->environment, as_fmi(status), core_category(status), message);
+    if (f->logger) f->logger(f->environment, as_fmi(status), log_category(status), message);
 }
 
 const char *fmi3GetVersion(void) { return fmi3Version; }
 
 static void *no_instance(fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
                          const char *message) {
-    if (logger) logger(environment, fmi3Error, core_category(CORE_ERROR), message);
+    if (logger) logger(environment, fmi3Error, log_category(CORE_ERROR), message);
     return NULL;
 }
 
@@ -31,7 +31,8 @@ static face *instantiate(fmi3String name, fmi3String token, int cosimulation, fm
     face *f;
     if (!name || !*name) return no_instance(environment, logger, "the instance has no name");
     if (!token || strcmp(token, MODEL_GUID))
-        return no_instance(environment, logger, "the instantiation token is not the one of this "
+        return no_instance(environment, logger,
+                           "the instantiation token is not the one of this "
                            "model: the model description and the library belong to different FMUs");
 #ifdef MODEL_BARE
     if (!cosimulation)
@@ -48,8 +49,8 @@ static face *instantiate(fmi3String name, fmi3String token, int cosimulation, fm
         fmi3FreeInstance(f);
         return no_instance(environment, logger, "no memory is left");
     }
-    f->model.discards = logging;
-    f->model.timed = 1;
+    f->model.log.discards = logging;
+    f->model.host.timed = 1;
     return f;
 }
 
@@ -71,12 +72,13 @@ static int report(void *host, double time, int may_return, double *until) {
     return asked;
 }
 
-fmi3Instance fmi3InstantiateCoSimulation(
-    fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
-    fmi3Boolean logging, fmi3Boolean event_mode, fmi3Boolean early_return,
-    const fmi3ValueReference intermediate[], size_t n_intermediate,
-    fmi3InstanceEnvironment environment, fmi3LogMessageCallback logger,
-    fmi3IntermediateUpdateCallback update) {
+fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources,
+                                         fmi3Boolean visible, fmi3Boolean logging,
+                                         fmi3Boolean event_mode, fmi3Boolean early_return,
+                                         const fmi3ValueReference intermediate[],
+                                         size_t n_intermediate, fmi3InstanceEnvironment environment,
+                                         fmi3LogMessageCallback logger,
+                                         fmi3IntermediateUpdateCallback update) {
     face *f;
     size_t i;
     (void)resources, (void)visible;
@@ -86,9 +88,9 @@ fmi3Instance fmi3InstantiateCoSimulation(
     f = instantiate(name, token, 1, logging, environment, logger);
     if (!f) return NULL;
     f->update = update;
-    f->model.watch = update ? report : NULL;
-    f->model.event_mode = event_mode;
-    f->model.early_return = early_return;
+    f->model.host.watch = update ? report : NULL;
+    f->model.host.event_mode = event_mode;
+    f->model.host.early_return = early_return;
     return f;
 }
 
@@ -99,7 +101,8 @@ fmi3Instance fmi3InstantiateScheduledExecution(
     fmi3UnlockPreemptionCallback unlock) {
     (void)name, (void)token, (void)resources, (void)visible, (void)logging;
     (void)clock_update, (void)lock, (void)unlock;
-    return no_instance(environment, logger, "this model has no scheduled execution; use model "
+    return no_instance(environment, logger,
+                       "this model has no scheduled execution; use model "
                        "exchange or co-simulation");
 }
 
@@ -112,7 +115,7 @@ void fmi3FreeInstance(fmi3Instance c) {
 fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n,
                                const fmi3String categories[]) {
     NEED(c);
-    return as_fmi(core_set_logging(MODEL(c), on, categories, n));
+    return as_fmi(log_select(&MODEL(c)->log, on, categories, n));
 }
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_defined,
@@ -125,8 +128,11 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_def
     return as_fmi(status ? status : core_enter_initialization(MODEL(c)));
 }
 
-#define FORWARD(name, call) \
-    fmi3Status name(fmi3Instance c) { NEED(c); return as_fmi(call(MODEL(c))); }
+#define FORWARD(name, call)            \
+    fmi3Status name(fmi3Instance c) {  \
+        NEED(c);                       \
+        return as_fmi(call(MODEL(c))); \
+    }
 
 FORWARD(fmi3ExitInitializationMode, core_exit_initialization)
 FORWARD(fmi3Terminate, core_terminate)
@@ -147,7 +153,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     for (i = 0; i <= e.n && !status; i++) {
         if (i < e.n && e.ref[i] != TIME_REFERENCE) continue;
         status = as_fmi(core_get(MODEL(c), e.ref + first, i - first, value + first));
-        if (i < e.n && !status) value[i] = MODEL(c)->m.time;
+        if (i < e.n && !status) value[i] = MODEL(c)->m.run.time;
         first = i + 1;
     }
     elements_end(c, &e);
@@ -165,8 +171,8 @@ fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t 
     return as_fmi(status);
 }
 
-fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
-                        fmi3Int32 value[], size_t n_values) {
+fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Int32 value[],
+                        size_t n_values) {
     NEED(c);
     if (n != n_values) return refused(c, "give one place for each integer variable");
     return as_fmi(core_get_modes(MODEL(c), vr, n, value));
@@ -179,16 +185,16 @@ fmi3Status fmi3SetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
 }
 
 /* Getters and setters of types without variables. */
-#define NO_VARIABLES(type, text)                                                                \
-    fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n,           \
-                             fmi3##type value[], size_t n_values) {                             \
-        (void)vr, (void)value, (void)n_values;                                                  \
-        return none(c, n, "the model has no " text " variables");                               \
-    }                                                                                           \
-    fmi3Status fmi3Set##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n,           \
-                             const fmi3##type value[], size_t n_values) {                       \
-        (void)vr, (void)value, (void)n_values;                                                  \
-        return none(c, n, "the model has no " text " variables");                               \
+#define NO_VARIABLES(type, text)                                                      \
+    fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, \
+                             fmi3##type value[], size_t n_values) {                   \
+        (void)vr, (void)value, (void)n_values;                                        \
+        return none(c, n, "the model has no " text " variables");                     \
+    }                                                                                 \
+    fmi3Status fmi3Set##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, \
+                             const fmi3##type value[], size_t n_values) {             \
+        (void)vr, (void)value, (void)n_values;                                        \
+        return none(c, n, "the model has no " text " variables");                     \
     }
 
 NO_VARIABLES(Float32, "32-bit float")
@@ -216,8 +222,9 @@ fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n
 
 fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance c, fmi3ValueReference vr, size_t *n) {
     (void)vr, (void)n;
-    return refused(c, "dependencies of elements are not listed; see those of the variables in the "
-                      "model description");
+    return refused(c,
+                   "dependencies of elements are not listed; see those of the variables in the "
+                   "model description");
 }
 
 fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference dependent,
@@ -226,6 +233,7 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference depend
                                        size_t n) {
     (void)dependent, (void)elements, (void)independents, (void)independent_elements;
     (void)kinds, (void)n;
-    return refused(c, "dependencies of elements are not listed; see those of the variables in the "
-                      "model description");
+    return refused(c,
+                   "dependencies of elements are not listed; see those of the variables in the "
+                   "model description");
 }

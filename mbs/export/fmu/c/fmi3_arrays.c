@@ -3,9 +3,7 @@
 
 #ifdef MODEL_ARRAYS
 
-static size_t size_of(fmi3ValueReference vr) {
-    return vr < N_VALUES ? (size_t)MODEL_SIZES[vr] : 1;
-}
+static size_t size_of(fmi3ValueReference vr) { return vr < N_VALUES ? (size_t)MODEL_SIZES[vr] : 1; }
 
 /* Allocate the references and orders of all elements. Returns 0 on failure: a reference is that of
  * an array element, or no memory is left. */
@@ -16,10 +14,11 @@ static int spread(fmi3Instance c, elements *e, const fmi3ValueReference vr[], si
     core_integer *of_order;
     for (i = 0; i < n; count += size_of(vr[i++]))
         if (!size_of(vr[i])) {
-            refused(c, "a value reference is that of an element of an array; use that of the array");
+            refused(c,
+                    "a value reference is that of an element of an array; use that of the array");
             return 0;
         }
-    e->own = MODEL(c)->supply.take(c, (count + 1) * (sizeof *ref + sizeof *of_order));
+    e->own = MODEL(c)->host.supply.take(c, (count + 1) * (sizeof *ref + sizeof *of_order));
     if (!e->own) {
         refused(c, "no memory is left for the elements of the variables");
         return 0;
@@ -55,6 +54,6 @@ int elements_begin(fmi3Instance c, elements *e, const fmi3ValueReference vr[], s
 }
 
 void elements_end(fmi3Instance c, elements *e) {
-    if (e->own) MODEL(c)->supply.drop(c, e->own);
+    if (e->own) MODEL(c)->host.supply.drop(c, e->own);
     e->own = NULL;
 }

@@ -27,7 +27,7 @@ static inline fmi3Status as_fmi(core_status status) {
 
 static inline fmi3Status refused(fmi3Instance c, const char *message) {
     NEED(c);
-    return as_fmi(core_refuse(MODEL(c), "%s: %s", MODEL(c)->name, message));
+    return as_fmi(log_error(&MODEL(c)->log, "%s", message));
 }
 
 /* Return an error with this message unless the array of size n, of a kind that the model does not

@@ -51,9 +51,9 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_
         if (!elements_begin(c, &of, unknown, n_unknown, NULL, answers)) return fmi3Error;       \
         if (elements_begin(c, &by, known, n_known, NULL, seeds)) {                              \
             status = call(MODEL(c), of.ref, of.n, by.ref, by.n, seed, answer);                  \
-            elements_end(c, &by);                                                                  \
+            elements_end(c, &by);                                                               \
         }                                                                                       \
-        elements_end(c, &of);                                                                      \
+        elements_end(c, &of);                                                                   \
         return as_fmi(status);                                                                  \
     }
 
@@ -124,8 +124,12 @@ static fmi3Status give_number(fmi3Instance c, size_t *n, size_t count) {
     return fmi3OK;
 }
 
-fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) { return give_number(c, n, NK + NC); }
-fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) { return give_number(c, n, NX); }
+fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *n) {
+    return give_number(c, n, NK + NC);
+}
+fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *n) {
+    return give_number(c, n, NX);
+}
 
 /* ---- co-simulation ---- */
 
@@ -141,7 +145,7 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 h, fmi3Boole
     status = core_do_step(MODEL(c), time, h, &stop);
     *event = stop.event != 0;
     *early = stop.early != 0;
-    *last = MODEL(c)->m.time;
+    *last = MODEL(c)->m.run.time;
     return as_fmi(status);
 }
 

@@ -2,17 +2,17 @@
 #ifndef MBS_GUARD_H
 #define MBS_GUARD_H
 
-#include "core.h"
+#include "machine.h"
 
 /* Store the present configuration as the reference of the next comparison. Required after a start,
  * a jump, or a change of an input or parameter of the accelerations. */
-core_status guard_restart(core *c);
+core_status guard_restart(machine *m);
 
 /* Compare the present configuration with the reference, then make it the reference. Error if the
  * motion between the two passes a singular configuration. */
-core_status guard_pass(core *c);
+core_status guard_pass(machine *m);
 
 /* Discard the reference, because a jump or a new input has made it invalid. */
-void guard_forget(core *c);
+void guard_forget(machine *m);
 
 #endif

@@ -2,9 +2,9 @@
 
 #include <math.h>
 
-#define EXACT 22 /* exponent of the largest power of ten that a double represents exactly */
+#define EXACT 22       /* exponent of the largest power of ten that a double represents exactly */
 #define MOST_DIGITS 15 /* number of decimal digits that a double always keeps */
-#define PLAIN -4 /* smaller powers of ten are written with an exponent, as printf does */
+#define PLAIN -4       /* smaller powers of ten are written with an exponent, as printf does */
 
 void message_begin(message *m, char *text, size_t size) {
     m->text = text;
@@ -13,6 +13,7 @@ void message_begin(message *m, char *text, size_t size) {
     text[0] = 0;
 }
 
+/* Append a character. */
 static void letter(message *m, char c) {
     if (m->length + 1 >= m->size) return;
     m->text[m->length++] = c;
@@ -23,6 +24,7 @@ void message_text(message *m, const char *text) {
     while (*text) letter(m, *text++);
 }
 
+/* Append a whole number. */
 static void whole(message *m, unsigned long value) {
     char digits[3 * sizeof value];
     int n = 0;
@@ -31,6 +33,7 @@ static void whole(message *m, unsigned long value) {
     while (n) letter(m, digits[--n]);
 }
 
+/* Ten to a power of at least 0. */
 static double power(int exponent) {
     double p = 1.0;
     while (exponent-- > 0) p *= 10.0;

@@ -1,228 +1,163 @@
-/* Equations for the solver of co-simulation. Loops are closed at every evaluation. */
+/* Equations for the integrator, as functions of its coordinates. Loops are closed at every
+ * evaluation. All callbacks return 0, or nonzero if they have no value. */
 #include "solver.h"
-
-#include "closure.h"
-#include "internal.h"
-#include "projection.h"
 
 #include <math.h>
 #include <string.h>
 
-static int rhs(void *user, double t, const double *x, double *xdot) {
-    core *c = user;
-    return closure_solve(&c->loops, x, c->z) || core_call_rhs(c, t, x, c->z, xdot, NULL);
+#include "projection.h"
+
+/* Derivatives of the states. */
+static int states_rhs(void *user, double t, const double *x, double *xdot) {
+    machine *m = ((core_solver *)user)->machine;
+    return closure_solve(&m->loops, x, m->z) || machine_rhs(m, t, x, m->z, xdot, NULL);
 }
 
 #if defined MODEL_RODAS && !defined MODEL_TREE
-static int jacobian(void *user, double t, const double *x, double *J, double *f_t) {
-    core *c = user;
+/* d xdot / d x (NX, NX), column by column, and d xdot / d t (NX,). */
+static int states_jacobian(void *user, double t, const double *x, double *J, double *f_t) {
+    machine *m = ((core_solver *)user)->machine;
     double du[NU + 1];
-    if (closure_solve(&c->loops, x, c->z)) return 1;
-    core_point(c, &t, x, c->z);
-    core_input_rates(c, t, du);
-    c->arg[5] = du;
-    c->res[0] = J;
-    c->res[1] = f_t;
-    return mbs_jacobian(c->arg, c->res, c->iw, c->w, 0);
+    if (closure_solve(&m->loops, x, m->z)) return 1;
+    machine_point(m, &t, x, m->z);
+    machine_input_rates(m, t, du);
+    m->arg[5] = du;
+    m->res[0] = J;
+    m->res[1] = f_t;
+    return machine_call(m, mbs_jacobian);
 }
 #endif
 
 #ifdef MODEL_TREE
 
-static int tree_rhs(void *user, double t, const double *x, double *xdot) {
-    core *c = user;
-    core_point(c, &t, x, c->z);
-    c->res[0] = xdot;
-    c->res[1] = NULL;
-    return mbs_tree_rhs(c->arg, c->res, c->iw, c->w, 0);
+const passage_size TREE_SIZE = MODEL_PASSAGE;
+
+/* Derivatives of the coordinates of the tree. */
+static int tree_rhs(void *user, double t, const double *X, double *Xdot) {
+    machine *m = ((core_solver *)user)->machine;
+    machine_point(m, &t, X, m->z);
+    m->res[0] = Xdot;
+    m->res[1] = NULL;
+    return machine_call(m, mbs_tree_rhs);
 }
 
-static int tree_project_once(void *user, double t, const double *x, double *after,
+/* One Newton step of the projection onto the rows. */
+static int tree_project_once(void *user, double t, const double *X, double *after,
                              double *residual) {
-    core *c = user;
-    core_point(c, &t, x, c->z);
-    c->res[0] = after;
-    c->res[1] = residual;
-    return mbs_tree_project(c->arg, c->res, c->iw, c->w, 0);
+    machine *m = ((core_solver *)user)->machine;
+    machine_point(m, &t, X, m->z);
+    m->res[0] = after;
+    m->res[1] = residual;
+    return machine_call(m, mbs_tree_project);
 }
 
-static int tree_project(void *user, double t, double *x) {
-    core *c = user;
+int solver_project_tree(core_solver *s, double t, double *X) {
     double projected[NT];
-    if (!passage_project(c->passage, t, x)) return 0;
-    return projection_converge(NT, tree_project_once, c, t, x, projected);
+    if (!passage_project(s->passage, t, X)) return 0;
+    return projection_converge(NT, tree_project_once, s, t, X, projected);
 }
 
-static int tree_rows(void *user, double t, const double *x, const passage_rows *r) {
-    core *c = user;
+/* Projection onto the rows, as callback of the integrator. */
+static int tree_project(void *user, double t, double *X) {
+    return solver_project_tree((core_solver *)user, t, X);
+}
+
+/* Constraint rows, see passage.h. */
+static int tree_rows(void *user, double t, const double *X, const passage_rows *r) {
+    machine *m = ((core_solver *)user)->machine;
     double *const to[] = {r->position, r->slope, r->J, r->b, r->c, r->N, r->bend, r->rank};
-    core_point(c, &t, x, c->z);
-    memcpy(c->res, to, sizeof to);
-    return mbs_tree_rows(c->arg, c->res, c->iw, c->w, 0);
+    machine_point(m, &t, X, m->z);
+    memcpy(m->res, to, sizeof to);
+    return machine_call(m, mbs_tree_rows);
 }
 
-static int tree_forces(void *user, double t, const double *x, double *M, double *f, double *rate) {
-    core *c = user;
-    core_point(c, &t, x, c->z);
-    c->res[0] = M;
-    c->res[1] = f;
-    c->res[2] = rate;
-    return mbs_tree_forces(c->arg, c->res, c->iw, c->w, 0);
+/* Inertia matrix M, forces f, and rates of the states of components, see passage.h. */
+static int tree_forces(void *user, double t, const double *X, double *M, double *f, double *rate) {
+    machine *m = ((core_solver *)user)->machine;
+    machine_point(m, &t, X, m->z);
+    m->res[0] = M;
+    m->res[1] = f;
+    m->res[2] = rate;
+    return machine_call(m, mbs_tree_forces);
 }
 
-static int tree_regularity(void *user, double t, const double *x, double *value) {
-    core *c = user;
-    core_point(c, &t, x, c->z);
-    c->res[0] = value;
-    return mbs_tree_regularity(c->arg, c->res, c->iw, c->w, 0);
+/* Measure of the independence of the rows, see passage.h. */
+static int tree_regularity(void *user, double t, const double *X, double *value) {
+    machine *m = ((core_solver *)user)->machine;
+    machine_point(m, &t, X, m->z);
+    m->res[0] = value;
+    return machine_call(m, mbs_tree_regularity);
 }
 
 #ifdef MODEL_RODAS
-static int tree_jacobian(void *user, double t, const double *x, double *J, double *f_t) {
-    core *c = user;
+/* d Xdot / d X (NT, NT), column by column, and d Xdot / d t (NT,). */
+static int tree_jacobian(void *user, double t, const double *X, double *J, double *f_t) {
+    machine *m = ((core_solver *)user)->machine;
     double du[NU + 1];
-    core_point(c, &t, x, c->z);
-    core_input_rates(c, t, du);
-    c->arg[5] = du;
-    c->res[0] = J;
-    c->res[1] = f_t;
-    return mbs_tree_jacobian(c->arg, c->res, c->iw, c->w, 0);
+    machine_point(m, &t, X, m->z);
+    machine_input_rates(m, t, du);
+    m->arg[5] = du;
+    m->res[0] = J;
+    m->res[1] = f_t;
+    return machine_call(m, mbs_tree_jacobian);
 }
 #endif
 
-static int init_tree(core *c) {
-    static const passage_size size = MODEL_PASSAGE;
+/* Initialise the integration of the tree. Returns 1 if no memory is left. */
+static int init_tree(core_solver *s) {
     static const passage_model model = {tree_rows, tree_forces, tree_regularity, MODEL_REGULARITY};
 #ifdef MODEL_RODAS
-    if (c->m.cosimulation)
-        rodas_init(&c->solver, NT, tree_rhs, tree_jacobian, c, c->m.solver, c->work);
+    if (s->machine->run->cosimulation)
+        rodas_init(&s->stepper, NT, tree_rhs, tree_jacobian, s, s->memory->stepper, s->work);
     else
 #endif
-    dopri5_init(&c->solver, NT, tree_rhs, c, c->m.solver, c->work);
-    c->solver.project = tree_project;
-    c->passage = passage_new(&c->solver, &size, NULL, &model, &c->m.passage, c->m.origin);
-    return c->passage == NULL;
+        dopri5_init(&s->stepper, NT, tree_rhs, s, s->memory->stepper, s->work);
+    s->stepper.project = tree_project;
+    s->passage =
+        passage_new(&s->stepper, &TREE_SIZE, NULL, &model, &s->tree->passage, s->tree->origin);
+    return s->passage == NULL;
 }
 
+#endif
+
+void solver_take_coordinates(core_solver *s, int tree) {
 #if MODEL_TREE_OUTSIDE
-void core_take_states(core *c, int tree) {
-    c->solver.n = tree ? NT : NX;
-    c->solver.project = tree ? tree_project : NULL;
-}
+    s->stepper.n = tree ? NT : NX;
+    s->stepper.project = tree ? tree_project : NULL;
+#else
+    (void)s, (void)tree;
 #endif
-
-core_status core_start_tree(core *c) {
-    double t = c->m.time;
-    passage_start(c->passage);
-    core_point(c, &t, c->m.values + STATES, c->m.values + DEPENDENTS);
-    c->res[0] = c->m.tree;
-    if (mbs_tree_start(c->arg, c->res, c->iw, c->w, 0) || !stepper_all_finite(c->m.tree, NT) ||
-        tree_project(c, t, c->m.tree))
-        return core_no_answer(c, "%s: the velocities have no solution at time %.9g", c->name, t);
-    return CORE_OK;
 }
 
-/* Error for a singular start whose velocities select no branch. The message names the joint whose
- * velocity the loops constrain least. */
-static core_status undetermined(core *c) {
-    static const passage_size size = MODEL_PASSAGE;
-    int k = passage_loosest(c->passage, c->m.time, c->m.tree, MODEL_TREE_UNITS), i, known = -1;
-    for (i = 0; i < NX; i++)
-        if (MODEL_TREE_STATES[i] == size.nq + k) known = STATES + i;
-    for (i = 0; i < N_PASSIVE; i++)
-        if (MODEL_TREE_PASSIVE[i] == size.nq + k) known = OUTPUTS + PASSIVE_V + i;
-    return core_no_answer(
-        c, "%s: it starts at time %.9g in a singular configuration (%s), where branches of motion "
-           "meet, and its velocities are those of no branch with the mobility of the mechanism; "
-           "the loops hardly hold %s there: set velocities of one branch, also of dependent joints, "
-           "or start beside it", c->name, c->m.time, core_where(c),
-        k < 0 || known < 0 ? "the joints" : MODEL_NAMES[known]);
-}
-
-/* Set the state of the tree from the states, z and the given velocities of dependent joints. */
-static void place_tree(core *c, const double *z) {
-    double *X = c->m.tree;
-    int i;
-    passage_start(c->passage);
-    for (i = 0; i < NX; i++) X[MODEL_TREE_STATES[i]] = c->m.values[STATES + i];
-    for (i = 0; i < NZ; i++) X[MODEL_TREE_DEPENDENTS[i]] = z[i];
-    for (i = 0; i < N_PASSIVE; i++) X[MODEL_TREE_PASSIVE[i]] = c->m.speeds[i];
-}
-
-int core_starts_singular(core *c, const double *z) {
-    place_tree(c, z);
-    return passage_singular(c->passage, c->m.time, c->m.tree) ||
-           closure_singular(&c->loops, c->m.values + STATES, z);
-}
-
-core_status core_start_singular(core *c, double *z) {
-    static const passage_size size = MODEL_PASSAGE;
-    double *X = c->m.tree, on[NT];
-    int kept[N_HELD + N_PASSIVE + 1], count = 0, i;
-    place_tree(c, z);
-    if (passage_place(c->passage, c->m.time, X, MODEL_TREE_DEPENDENTS, NZ))
-        return core_no_answer(c, "%s: unclosable configuration at time %.9g (%s): no dependent "
-                              "coordinates near the last ones close the loops; start elsewhere or "
-                              "move less", c->name, c->m.time, core_where(c));
-    for (i = 0; i < NZ; i++) z[i] = X[MODEL_TREE_DEPENDENTS[i]];
-    if (core_first_modes(c)) return CORE_ERROR;
-    for (i = 0; i < N_HELD; i++) kept[count++] = MODEL_TREE_HELD[i];
-    for (i = 0; i < N_PASSIVE; i++)
-        if (c->m.speeds[i] != MODEL_START[OUTPUTS + PASSIVE_V + i])
-            kept[count++] = MODEL_TREE_PASSIVE[i] - size.nq;
-    if (passage_velocities(c->passage, c->m.time, X, kept, count))
-        return core_no_answer(
-            c, "%s: it starts at time %.9g in a singular configuration (%s) in which the loops allow "
-               "no motion with the velocities that are set; set others, also of dependent joints, "
-               "such as %s, or start elsewhere", c->name, c->m.time, core_where(c),
-            MODEL_NAMES[OUTPUTS + PASSIVE_V]);
-    if (passage_slope(c->passage, c->m.time, X, c->m.slope, on)) return undetermined(c);
-    memcpy(X, on, sizeof(double) * (size_t)size.nq); /* positions on the branch */
-    c->m.singular = 1;
-    core_show_tree(c);
-    return CORE_OK;
-}
-
-void core_show_slope(const double *slope, double *y) {
-    static const passage_size size = MODEL_PASSAGE;
-    int i;
-    for (i = 0; i < N_HELD; i++) y[i] = slope[size.nq + MODEL_TREE_HELD[i]];
-    for (i = 0; i < N_PASSIVE; i++) y[PASSIVE_A + i] = slope[MODEL_TREE_PASSIVE[i]];
-}
-
-void core_show_tree(core *c) {
-    int i;
-    for (i = 0; i < NX; i++) c->m.values[STATES + i] = c->m.tree[MODEL_TREE_STATES[i]];
-    for (i = 0; i < NZ; i++) c->m.values[DEPENDENTS + i] = c->m.tree[MODEL_TREE_DEPENDENTS[i]];
-    memcpy(c->m.configuration_x, c->m.values + STATES, NX * sizeof(double));
-    memcpy(c->m.configuration_z, c->m.values + DEPENDENTS, NZ * sizeof(double));
-}
-
-int core_call_tree(core *c, const double *X, double *Xdot, double *y) {
-    core_point(c, &c->m.time, X, c->z);
-    c->res[0] = Xdot;
-    c->res[1] = y;
-    return mbs_tree_rhs(c->arg, c->res, c->iw, c->w, 0);
-}
-
+int solver_init(core_solver *s, machine *m, core_solver_memory *memory) {
+    s->machine = m;
+    s->memory = memory;
+#if MODEL_TREE_OUTSIDE
+    s->charts = &memory->charts;
 #endif
-
-int core_init_solver(core *c) {
 #ifdef MODEL_TREE
-    if (ON_TREE(c)) return init_tree(c);
+    s->tree = &memory->tree;
+    if (solver_has_tree(s)) return init_tree(s);
 #endif
 #if defined MODEL_RODAS && !defined MODEL_TREE
-    rodas_init(&c->solver, NX, rhs, jacobian, c, c->m.solver, c->work);
+    rodas_init(&s->stepper, NX, states_rhs, states_jacobian, s, memory->stepper, s->work);
 #elif defined MODEL_FIXED_STEP
-    rk4_init(&c->solver, NX, rhs, c, c->m.solver, c->work);
+    rk4_init(&s->stepper, NX, states_rhs, s, memory->stepper, s->work);
 #else
-    dopri5_init(&c->solver, NX, rhs, c, c->m.solver, c->work);
+    dopri5_init(&s->stepper, NX, states_rhs, s, memory->stepper, s->work);
 #endif
-    c->solver.nominal = MODEL_NOMINAL + STATES;
+    s->stepper.nominal = MODEL_NOMINAL + STATES;
 #ifdef MODEL_FIXED_STEP
-    stepper_fix(&c->solver, MODEL_FIXED_STEP);
+    stepper_fix(&s->stepper, MODEL_FIXED_STEP);
 #endif
     return 0;
+}
+
+void solver_end(core_solver *s) {
+#ifdef MODEL_TREE
+    passage_free(s->passage);
+#endif
+    (void)s;
 }
 
 #ifdef MODEL_APPROACHES
@@ -231,12 +166,12 @@ int core_init_solver(core *c) {
 static const double AFTER_CONTACT = 1e-9;
 #endif
 
-void core_prepare_solver(core *c) {
-    c->solver.rtol = c->solver.atol = c->m.tolerance;
+void solver_prepare(core_solver *s) {
+    s->stepper.rtol = s->stepper.atol = s->memory->tolerance;
 #ifdef MODEL_MAX_STEP
-    c->solver.h_max = MODEL_MAX_STEP;
+    s->stepper.h_max = MODEL_MAX_STEP;
 #endif
 #ifdef MODEL_APPROACHES
-    c->solver.afresh = AFTER_CONTACT;
+    s->stepper.afresh = AFTER_CONTACT;
 #endif
 }

@@ -59,8 +59,8 @@ static int kinked(const watched *a, const watched *b, const real *unit) {
         real half = REAL(0.5) * h * real_max(real_abs(a->a[i]), real_abs(b->a[i]));
         real change = b->v[i] - a->v[i] - REAL(0.5) * h * (a->a[i] + b->a[i]);
         most = real_max(most, real_abs(change) / unit[i]);
-        size = real_max(
-            size, real_max(half, real_max(real_abs(a->v[i]), real_abs(b->v[i]))) / unit[i]);
+        size = real_max(size,
+                        real_max(half, real_max(real_abs(a->v[i]), real_abs(b->v[i]))) / unit[i]);
     }
     return most > real_max(KINK * size, REST);
 }

@@ -46,14 +46,16 @@ a frame on the wrong side an error of a link length. Positions are relative to t
 _FUNCTIONS = {"sin": np.sin, "cos": np.cos, "tan": np.tan, "sqrt": np.sqrt, "atan2": np.arctan2}
 
 
-def prove(
+def check_poses(
     mechanism: Description,
     framed: KhalilTree,
     places: Places,
     symbols: Mapping[str, SX],
     values: Mapping[str, float],
 ) -> None:
-    """Raise if the pose of a body or joint in the tree differs from the description.
+    """Raise if the pose of a body or joint frame in the tree differs from the description.
+
+    Poses are compared at random positions and random values of symbols.
 
     Args:
         mechanism: components and connections.
@@ -100,7 +102,7 @@ def prove(
 
 
 def _positions(rng: np.random.Generator, motion: Motion, samples: int) -> Array:
-    """Return (samples, nq) random positions of a joint, with unit quaternions."""
+    """Return random positions (samples, nq) of a joint motion, with unit quaternions."""
     values = rng.uniform(-2.0, 2.0, (samples, motion.nq))
     if motion in (Motion.SPHERICAL, Motion.FREE):
         values[:, -4:] /= np.linalg.norm(values[:, -4:], axis=1, keepdims=True)
@@ -113,7 +115,11 @@ def _positions(rng: np.random.Generator, motion: Motion, samples: int) -> Array:
 def _describe(
     mechanism: Description, framed: KhalilTree, known: Mapping[str, Array], q: Mapping[str, Array]
 ) -> dict[tuple[str, str], Array]:
-    """Return the poses of bodies and joints in the world, and of free ends of kept cut joints."""
+    """Return the poses of bodies and joint frames in the world, from the description.
+
+    `known` are parameter values (samples,) and `q` positions (samples, nq) by name. Free ends of
+    cut joints that stay in the tree have the port "free".
+    """
     ways: dict[Port, list[tuple[Port, Callable[[], Array]]]] = {}
 
     def connect(a: Port, b: Port, out: Callable[[], Array], back: Callable[[], Array]) -> None:
@@ -138,7 +144,7 @@ def _describe(
                 (name, "a"),
                 (name, "b"),
                 lambda name=name, moves=moves: _motion(name, moves, q),  # type: ignore[misc]
-                lambda name=name, moves=moves: _motion_back(name, moves, q),  # type: ignore[misc]
+                lambda name=name, moves=moves: _inverse(_motion(name, moves, q)),  # type: ignore[misc]
             )
     found: dict[tuple[str, str], Array] = {(mechanism.world.name, ""): np.eye(4)}
     queue = deque(found)
@@ -155,6 +161,7 @@ def _describe(
 
 
 def _placement(placement: Placement, known: Mapping[str, Array]) -> Array:
+    """Return the transform (..., 4, 4) of a placement at the parameter values `known`."""
     T: Array = np.eye(4)
     for step in placement.steps:
         match step:
@@ -173,7 +180,7 @@ def _placement(placement: Placement, known: Mapping[str, Array]) -> Array:
 
 
 def _number(value: Expression, known: Mapping[str, Array]) -> Any:
-    """Return the value of an expression: a number, or an array over the samples."""
+    """Return the value of an expression at parameter values: a number, or an array (samples,)."""
     if isinstance(value, Number):
         return value.value
     if isinstance(value, Parameter):
@@ -185,20 +192,18 @@ def _number(value: Expression, known: Mapping[str, Array]) -> Any:
 
 
 def _motion(name: str, freedoms: Sequence[Freedom], q: Mapping[str, Array]) -> Array:
-    """Return the pose of frame_b of a joint in its frame_a."""
+    """Return the pose of frame_b of joint `name` in its frame_a, at positions q by coordinate."""
     T: Array = np.eye(4)
     for freedom in freedoms:
         T = T @ _elementary_motion(freedom, q[freedom.coordinate_of(name)])
     return T
 
 
-def _motion_back(name: str, freedoms: Sequence[Freedom], q: Mapping[str, Array]) -> Array:
-    """Return the pose of frame_a of a joint in its frame_b."""
-    return _inverse(_motion(name, freedoms, q))
-
-
 def _elementary_motion(freedom: Freedom, q: Array) -> Array:
-    """Return (samples, 4, 4) transforms of an elementary motion, by Rodrigues' formula."""
+    """Return transforms (samples, 4, 4) of a joint freedom at positions q (samples, nq).
+
+    Rotations follow from Rodrigues' formula.
+    """
     T = np.tile(np.eye(4), (len(q), 1, 1))
     x, y, z = freedom.axis
     match freedom.motion:
@@ -216,7 +221,7 @@ def _elementary_motion(freedom: Freedom, q: Array) -> Array:
 
 
 def _of_quaternion(q: Array) -> Array:
-    """Return the (samples, 3, 3) rotations of unit quaternions w, x, y, z."""
+    """Return the rotation matrices (samples, 3, 3) of unit quaternions w, x, y, z (samples, 4)."""
     w, e = q[:, 0, None, None], q[:, 1:]
     x, y, z = e.T
     zero = np.zeros_like(x)
@@ -225,6 +230,7 @@ def _of_quaternion(q: Array) -> Array:
 
 
 def _shift(x: Any, y: Any, z: Any) -> Array:
+    """Return the transform (..., 4, 4) of a translation; x, y, z are numbers or arrays."""
     shape = np.broadcast_shapes(*(np.shape(value) for value in (x, y, z)))
     T = np.zeros((*shape, 4, 4))
     T[..., range(4), range(4)] = 1.0
@@ -233,6 +239,7 @@ def _shift(x: Any, y: Any, z: Any) -> Array:
 
 
 def _turn(axis: str, angle: Any) -> Array:
+    """Return the transform (..., 4, 4) of a rotation about the axis "x", "y" or "z" by an angle."""
     k = "xyz".index(axis)
     i, j = (k + 1) % 3, (k + 2) % 3
     T = np.zeros((*np.shape(angle), 4, 4))
@@ -244,7 +251,7 @@ def _turn(axis: str, angle: Any) -> Array:
 
 
 def _inverse(T: Array) -> Array:
-    """Return the inverse transform."""
+    """Return the inverses (..., 4, 4) of rigid transforms."""
     back = np.zeros_like(T)
     R = np.swapaxes(T[..., :3, :3], -1, -2)
     back[..., :3, :3] = R
@@ -263,7 +270,10 @@ def _assembled(
     rows: Array,
     q: Mapping[str, Array],
 ) -> Array:
-    """Return the (frames, samples, 4, 4) poses of frames on the links."""
+    """Return the poses (frames, samples, 4, 4) in the base of frames on links, from the tree.
+
+    `rows` (samples, symbols) are parameter values and `q` positions by name of the link.
+    """
     own = [casadi.vertcat(*frame.parameters) for link in tree.links for frame in link.frames]
     six = np.moveaxis(_at_samples(own, symbols, rows)[..., 0], -1, 0)
     placed = iter(_khalil(*six))
@@ -279,7 +289,10 @@ def _assembled(
 
 
 def _at_samples(values: Sequence[SX], symbols: Mapping[str, SX], rows: Array) -> Array:
-    """Return (values, samples, rows, columns) matrices of equal shape at every sample."""
+    """Return the matrix expressions at every sample, (values, samples, rows, columns).
+
+    `rows` (samples, symbols) are values of the symbols. All expressions have the same shape.
+    """
     if not values:
         return np.zeros((0, len(rows), 0, 0))
     shape = values[0].shape
@@ -293,7 +306,10 @@ def _at_samples(values: Sequence[SX], symbols: Mapping[str, SX], rows: Array) ->
 
 
 def _khalil(gamma: Array, b: Array, alpha: Array, d: Array, theta: Array, r: Array) -> Array:
-    """Return the (..., 4, 4) transform of Khalil & Kleinfinger 1986, written out."""
+    """Return the transform (..., 4, 4) of Khalil parameters, written out from its definition.
+
+    Source: Khalil & Kleinfinger 1986.
+    """
     cg, sg, ca, sa = np.cos(gamma), np.sin(gamma), np.cos(alpha), np.sin(alpha)
     ct, st = np.cos(theta), np.sin(theta)
     zero, one = np.zeros_like(cg * b * ca * d * ct * r), np.ones_like(cg * b * ca * d * ct * r)

@@ -26,7 +26,13 @@ Quantity = tuple[str, str]
 
 @dataclass(frozen=True, slots=True)
 class FlangeTurn:
-    """Rotation of a flange: `factor` times the coordinate, or fixed without a coordinate."""
+    """Rotation of a flange relative to its housing.
+
+    Attributes:
+        coordinate: name of the coordinate to which the rotation is proportional; empty for a fixed
+            flange.
+        factor: rotation of the flange per unit of the coordinate.
+    """
 
     coordinate: str
     factor: Expression
@@ -134,6 +140,7 @@ class ComponentInstance:
         return self.element.binds and not others
 
     def _unit(self, name: str) -> str:
+        """Return the unit of the declared quantity `name`; an effort has the unit of its joint."""
         unit = self.element.declared[name].unit
         return EFFORT_UNIT[self.levers[0].unit] if unit == EFFORT else unit
 
@@ -160,12 +167,23 @@ class ComponentInstance:
 
 
 def number_or_sx(factor: SX) -> float | SX:
-    """Return a constant as a number; other expressions unchanged."""
+    """Return a constant expression as a float, and other expressions unchanged.
+
+    Args:
+        factor: scalar expression.
+    """
     return float(factor) if factor.is_constant() else factor
 
 
 def as_fast(factor: float | SX, coordinate: str) -> str:
-    """Return the text of the speed of a shaft relative to a coordinate."""
+    """Return text on the speed of a shaft relative to a coordinate.
+
+    For example "2 times as fast as j1".
+
+    Args:
+        factor: speed of the shaft per speed of the coordinate.
+        coordinate: name of the coordinate; empty for a fixed shaft.
+    """
     if not coordinate:
         return "not at all, since its shaft is fixed"
     if isinstance(factor, float) and factor == 1:
@@ -175,12 +193,22 @@ def as_fast(factor: float | SX, coordinate: str) -> str:
 
 
 def parts_of(mechanism: Description) -> list[Custom]:
-    """Return all equation-based components, in the order of their addition."""
+    """Return all equation-based components of a mechanism, in the order of their addition.
+
+    Args:
+        mechanism: components and connections.
+    """
     return [c for c in mechanism.components.values() if isinstance(c, Custom) and c.has_equations]
 
 
 def with_unknowns(mechanism: Description) -> Description:
-    """Return the mechanism with a massless joint for every unknown, whose coordinate it is."""
+    """Return the mechanism with a massless joint for every unknown of a component.
+
+    The coordinate of the joint is the unknown. The mechanism itself is returned without unknowns.
+
+    Args:
+        mechanism: components and connections.
+    """
     unknowns = [
         (f"{part.name}.{name}", part.declared[name].unit)
         for part in parts_of(mechanism)
@@ -199,7 +227,11 @@ def with_unknowns(mechanism: Description) -> Description:
 
 
 def guesses_of_unknowns(mechanism: Description) -> dict[str, float]:
-    """Return the initial guesses of the unknowns, by coordinate name."""
+    """Return the initial guesses of the unknowns of components, by coordinate name.
+
+    Args:
+        mechanism: components and connections.
+    """
     return {
         f"{part.name}.{name}": float(getattr(part, name))
         for part in parts_of(mechanism)
@@ -210,7 +242,7 @@ def guesses_of_unknowns(mechanism: Description) -> dict[str, float]:
 def coordinates_needed(
     mechanism: Description, turns: Mapping[tuple[str, str], FlangeTurn]
 ) -> list[str]:
-    """Return the coordinates that equation-based components refer to, also by wires.
+    """Return the names of the coordinates to which equation-based components refer.
 
     Args:
         mechanism: mechanism without flanges.
@@ -266,6 +298,10 @@ def _attached(
     turns: Mapping[tuple[str, str], FlangeTurn],
     wires: Mapping[tuple[str, str], WireSource],
 ) -> ComponentInstance:
+    """Return one equation-based component with the links of its points and its coordinates.
+
+    The arguments are those of `attached_parts`; `wires` are the sources of wired inputs.
+    """
     # links and poses of its points
     frames = []
     for point in part.points:
@@ -279,7 +315,9 @@ def _attached(
         given[name] = ((turn.coordinate, turn.factor),) if turn.coordinate else ()
     given |= {name: ((f"{part.name}.{name}", 1.0),) for name in part.names_of("unknown")}
     coordinates = {
-        port: tuple(_lever(part, name, to_sx(factor, symbols), tables) for name, factor in levers)
+        port: tuple(
+            _moment_arm(part, name, to_sx(factor, symbols), tables) for name, factor in levers
+        )
         for port, levers in given.items()
     }
     names = [point.owner.name for point in part.points]
@@ -295,7 +333,7 @@ def _attached(
             for name in part.input_names
         },
         symbols=symbols,
-        where=_where(names) if names else "",
+        where=_place_text(names) if names else "",
     )
 
 
@@ -305,7 +343,12 @@ def _require_moving(
     coordinates: Mapping[str, tuple[MomentArm, ...]],
     names: Sequence[str],
 ) -> None:
-    """Raise AssemblyError if loads and rows act on bodies that cannot move."""
+    """Raise AssemblyError if a component with forces or rows acts on bodies that cannot move.
+
+    `names` are the components that it acts on.
+
+    `frames` are the links and poses of its points, `coordinates` its moment arms by name.
+    """
     links = {link for link, _ in frames}
     bodiless = not frames and not coordinates  # such as a capacitor, which has no ports
     if not (part.acts or part.binds or part.switches) or bodiless or any(coordinates.values()):
@@ -319,12 +362,19 @@ def _require_moving(
         )
 
 
-def _where(names: Sequence[str]) -> str:
+def _place_text(names: Sequence[str]) -> str:
+    """Return text on where a component acts: "on a" or "between a and b", for component `names`."""
     return f"between {listed(names)}" if len(names) > 1 else f"on {names[0]}"
 
 
-def _lever(part: Custom, name: str, factor: SX, tables: tuple[_Rows, _Rows, _Rows]) -> MomentArm:
-    """Return the moment arm of a component on a coordinate; raise if the coordinate is unknown."""
+def _moment_arm(
+    part: Custom, name: str, factor: SX, tables: tuple[_Rows, _Rows, _Rows]
+) -> MomentArm:
+    """Return the moment arm of a component on the coordinate `name`.
+
+    `factor` is the derivative of the port's value; `tables` are the coordinates of q, of v, and of
+    cut joints. Raises AssemblyError if the coordinate is unknown.
+    """
     coordinates, speeds, cut = tables
     q, v = ([row.name for row in table] for table in (coordinates, speeds))
     known = [speed for speed in v if speed in q or not part.needs_position]
@@ -349,7 +399,7 @@ def _lever(part: Custom, name: str, factor: SX, tables: tuple[_Rows, _Rows, _Row
 def _wires(
     mechanism: Description, sensors: Sequence[AttachedSensor]
 ) -> dict[tuple[str, str], WireSource]:
-    """Return the source of every wired input, by component and name.
+    """Return the source of every wired input, a dict with keys (component, input).
 
     Raises:
         AssemblyError: the source of a wire is no signal, or its ends have different units.
@@ -397,7 +447,7 @@ def _wires(
 
 
 def _may_be_wired(source: str, target: str) -> bool:
-    """Return whether units of source and target of a wire agree; 1 agrees with all units."""
+    """Whether the units of source and target of a wire agree; "1" agrees with all units."""
     free = ("1", EFFORT)
     if source in free or target in free:
         return True
@@ -409,6 +459,10 @@ def _may_be_wired(source: str, target: str) -> bool:
 
 
 def symbols_in_order(symbols: Iterable[SX]) -> SX:
-    """Return symbols as one column (n, 1); (0, 1) if there are none."""
+    """Return symbols as one column (n, 1).
+
+    Args:
+        symbols: n symbols.
+    """
     every = list(symbols)
     return casadi.vertcat(*every) if every else SX(0, 1)

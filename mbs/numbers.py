@@ -119,9 +119,9 @@ def on_arrays(function: Function) -> OnArrays:
 def _filled(
     values: Array, shape: tuple[int, int], places: tuple[list[int], list[int]] | None
 ) -> Array:
-    """Return the matrix of a shape with the elements `values`, zero elsewhere.
+    """Return the matrix of the shape `shape` with the elements `values`, zero elsewhere.
 
-    `places` are row and column indices of the elements; None if every element has a value.
+    `places` are row and column indices of the elements. None means all places, column by column.
     """
     if places is None:
         return np.ascontiguousarray(values.reshape(shape[::-1]).T)

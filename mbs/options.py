@@ -176,7 +176,10 @@ def option_fields(options: Any) -> dict[str, tuple[Field[Any], OptionInfo]]:
 
 
 def _in_order(options: Any) -> list[Field[Any]]:
-    """Return the fields in the order of the arguments: those that are keyword-only are last."""
+    """Return the fields of a dataclass in the order of its arguments: keyword-only ones last.
+
+    `options` is the dataclass or its instance.
+    """
     return sorted(fields(options), key=lambda field: field.kw_only is True)
 
 
@@ -247,10 +250,11 @@ def method_arguments_of(
 
 
 def _with_fields(action: Callable[..., Any], options: Any) -> Any:
-    """Return a function with the fields as parameters, which calls the action with an instance.
+    """Return a function that has the fields of `options` as parameters in place of `options`.
 
-    Its text is executed, as for the methods of a dataclass, so that wrong arguments raise the
-    errors of Python with the name of the action.
+    It calls `action` with an instance of the dataclass `options`. Its text is executed, as for the
+    methods of a dataclass, so that wrong arguments raise the errors of Python with the name of
+    `action`.
     """
     every = _in_order(options)
     own = inspect.signature(action)
@@ -277,13 +281,13 @@ def _with_fields(action: Callable[..., Any], options: Any) -> Any:
 
 
 def _kind_of(field: Field[Any]) -> Any:
-    """Return the kind of the parameter of a field, as in `inspect.Parameter`."""
+    """Return the kind of the parameter of a dataclass field, as in `inspect.Parameter`."""
     kinds = inspect.Parameter
     return kinds.KEYWORD_ONLY if field.kw_only else kinds.POSITIONAL_OR_KEYWORD
 
 
 def _default_of(field: Field[Any]) -> Any:
-    """Return the default of a parameter, or `inspect.Parameter.empty` if it has none."""
+    """Return the default of the parameter of a field; `inspect.Parameter.empty` if it has none."""
     return inspect.Parameter.empty if field.default is MISSING else field.default
 
 
@@ -293,7 +297,10 @@ def _passed(field: Field[Any]) -> str:
 
 
 def _documented(doc: str, every: Sequence[Field[Any]]) -> str:
-    """Return a docstring in which the entry `options` is replaced by one entry per option."""
+    """Return the docstring `doc` in which the entry `options` is replaced by entries of fields.
+
+    `every` are the fields, in the order of the entries.
+    """
     lines = []
     for line in doc.splitlines():
         if line.strip().startswith("options: "):

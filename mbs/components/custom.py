@@ -1054,7 +1054,7 @@ def _make_fields(cls: type[Custom], own: Mapping[str, Declared]) -> None:
 
 
 def _check_frame(component: Custom, name: str, what: Declared) -> None:
-    """Replace the field `name`, a body or a point, by a point, in place.
+    """Replace the field `name` of a component, a body or a point, by a point, in place.
 
     None stays if it is the default of the declaration `what`. Raise DescriptionError for other
     values.
@@ -1080,7 +1080,7 @@ def _check_coordinate(component: Custom, name: str, what: Declared) -> None:
 
 
 def _check_parameter(component: Custom, name: str, what: Declared) -> None:
-    """Convert the field `name` to an expression, in place.
+    """Convert the field `name` of a component to an expression, in place.
 
     Raise DescriptionError if it is a number outside the bounds of its declaration `what`.
     """
@@ -1099,7 +1099,7 @@ def _check_parameter(component: Custom, name: str, what: Declared) -> None:
 
 
 def _check_number(component: Custom, name: str, what: Declared) -> None:
-    """Convert the field `name` to a finite float, in place.
+    """Convert the field `name` of a component to a finite float, in place.
 
     Raise ExpressionError for other values.
     """

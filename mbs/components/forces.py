@@ -734,7 +734,10 @@ class Bushing(PairForce):
         return total
 
     def _elementwise_sum(self, one: str, x: SX, other: str, rate: SX, symbols: SymbolTable) -> SX:
-        """Return the sum (3, 1) of the fields `one` times x and `other` times rate, elementwise."""
+        """Return the sum (3, 1) of the fields `one` times x and `other` times rate, elementwise.
+
+        Each field has three values; `symbols` are the CasADi symbols of parameters by name.
+        """
         return self._vector(one, symbols) * x + self._vector(other, symbols) * rate
 
     def _vector(self, name: str, symbols: SymbolTable) -> SX:

@@ -807,7 +807,9 @@ class Fixed(Joint):
 
 
 def smooth_sign(v: SX, width: SX) -> SX:
-    """Return tanh(v / width), or sign(v) for a width of zero, elementwise.
+    """Return the sign of velocities, smoothed as tanh(v / width), elementwise.
+
+    For a width of zero it is sign(v).
 
     Args:
         v: velocities [rad/s or m/s].

@@ -322,7 +322,7 @@ def _steps(mechanism: Description, name: str, values: Sequence[Expression]) -> t
 
 
 def _freedom_steps(where: str, freedom: Freedom, values: Sequence[Expression]) -> Iterable[Step]:
-    """Return the displacement steps of an elementary motion at its position `values`.
+    """Return the displacement steps of the elementary motion `freedom` at its position `values`.
 
     `where` is named in error messages.
     """

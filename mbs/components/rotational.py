@@ -380,7 +380,10 @@ class LossyGear(TwoFlanges):
         return SX(self._torque(at) * self._losses(at) * at.flange_a.speed / at.ratio)
 
     def _losses(self, at: At) -> SX:
-        """Return the loss e of the class docstring: lost power as a fraction of T w."""
+        """Return the loss e of the mesh: lost power as a fraction of the power T w.
+
+        See the class.
+        """
         w = at.flange_a.speed / at.ratio
         s = casadi.tanh(w / at.width) * casadi.tanh(self._torque(at) / at.torque_width)
         forward, back = 1 / at.efficiency - 1, at.efficiency_back - 1

@@ -447,7 +447,7 @@ class Pulse(PeriodicSource):
         return [SX(at.duty * at.period), SX((1 - at.duty) * at.period)]
 
     def _level(self, at: At, since: SX) -> list[SX]:
-        """Return the heights of a pulse (1) and of the rest of a period (0)."""
+        """Return the heights of a pulse (1) and of the rest of a period (0), for any `since`."""
         return [SX(1), SX(0)]
 
 

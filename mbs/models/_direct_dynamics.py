@@ -223,9 +223,10 @@ def _articulated(system: System, s: ModelSymbols, tau: SX, around: ExternalForce
 
 
 def _composite(system: System, s: ModelSymbols, tau: SX, around: ExternalForces) -> SX:
-    """Return the independent accelerations for efforts tau by solving A a = tau - H.
+    """Return the accelerations (m, 1) for efforts tau (m, 1) by solving A a = tau - H.
 
-    `around` has the base motion and external wrenches.
+    They are in the coordinates of the symbols `s`. `around` has the base motion and external
+    wrenches.
     """
     A = tree_inertia(system.tree, s.poses)
     H = s.reduced_effort(tree_efforts(system, s, s.tree_acceleration(SX.zeros(s.size)), around))

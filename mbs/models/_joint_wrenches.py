@@ -106,7 +106,10 @@ def _wrench_on_joint(
 def _external_wrenches(
     system: System, part: WeldedPart, around: ExternalForces
 ) -> dict[int, Wrench]:
-    """Return the wrenches f_ext that the bodies of a part exert on their environment, by link."""
+    """Return the wrenches of the bodies of a welded part on their environment, by link index.
+
+    They are taken from the input f_ext of `around`; empty without this input.
+    """
     f_ext = dict(around.inputs).get("f_ext")
     if f_ext is None:
         return {}
@@ -117,9 +120,10 @@ def _external_wrenches(
 def _rotor_momentum_rate(
     system: System, part: WeldedPart, v: SX, a: SX, motion: Acceleration
 ) -> SX:
-    """Return the rate of the angular momentum of the rotors on a part, (3, 1), in its link frame.
+    """Return the rate of the angular momentum of the rotors on a welded part [N m], (3, 1).
 
-    `motion` is the motion of the link.
+    It is in axes of the link of the part, whose motion is `motion`. `v` and `a` (nv, 1) are
+    velocities and accelerations of the tree.
     """
     total = zeros()
     for link in system.tree.links:

@@ -170,7 +170,11 @@ class _Observed:
 def _observed(
     system: System, s: ModelSymbols, a: SX, tau: SX | None, around: ExternalForces
 ) -> _Observed:
-    """Return the motions and joint wrenches from which sensor signals are computed."""
+    """Return the motions and joint wrenches from which sensor signals are computed.
+
+    `a` are the accelerations (nv, 1) of the tree and `tau` its joint efforts, as in
+    `wrenches_of_joints`. Without joint sensors the wrenches are left out.
+    """
     transmits = any(attached.joint is not None for attached in system.sensors)
     wrenches = wrenches_of_joints(system, s, a, tau, around) if transmits else []
     return _Observed(
@@ -184,13 +188,19 @@ def _observed(
 
 
 def _frame_signals(state: _Observed, attached: AttachedSensor) -> Readings:
-    """Return the signals of a sensor of frame motion, or of a distance of frames, by name."""
+    """Return the signals, by name, of the sensor `attached` of a frame motion or a frame distance.
+
+    `state` has the motions of the links.
+    """
     tree = state.system.tree
     return frame_readings(tree, attached, state.s.q, state.velocities, state.accelerations)
 
 
 def _coordinate_signals(state: _Observed, attached: AttachedSensor) -> Readings:
-    """Return position, velocity and acceleration of the coordinate of a sensor, by name."""
+    """Return the signals, by name, of the sensor `attached` of a joint coordinate.
+
+    They are position, velocity and acceleration. `state` has the motions of the tree.
+    """
     system, s, name = state.system, state.s, attached.coordinate
     if attached.frames:
         return _cut_rotation(state, attached)
@@ -202,9 +212,10 @@ def _coordinate_signals(state: _Observed, attached: AttachedSensor) -> Readings:
 
 
 def _cut_rotation(state: _Observed, attached: AttachedSensor) -> Readings:
-    """Return the signals, by name, of an element of the rotation of a cut joint.
+    """Return the signals, by name, of the sensor `attached` of a cut joint's rotation.
 
-    It is a quaternion element, or an element of angular velocity and acceleration.
+    It measures a quaternion element, or an element of angular velocity and acceleration. `state`
+    has the motions of the links.
     """
     frame_a, frame_b = attached.frames
     motion = relative_motion(state.system.tree, frame_a, frame_b, state.s.q, state.velocities)
@@ -218,7 +229,10 @@ def _cut_rotation(state: _Observed, attached: AttachedSensor) -> Readings:
 
 
 def _joint_load(state: _Observed, attached: AttachedSensor) -> Readings:
-    """Return the force f and moment m that a joint transmits, in the axes of its sensor."""
+    """Return the force f and moment m that a joint transmits, in the axes of its sensor `attached`.
+
+    `state` has the joint wrenches.
+    """
     assert attached.joint is not None
     f, m = state.wrenches[attached.joint]
     home = attached.frames[1]
@@ -226,7 +240,10 @@ def _joint_load(state: _Observed, attached: AttachedSensor) -> Readings:
 
 
 def _power(state: _Observed, attached: AttachedSensor) -> Readings:
-    """Return the power P that a joint delivers to the body of its frame_b."""
+    """Return the power P that the joint of the sensor `attached` delivers to the body of frame_b.
+
+    `state` has motions and joint wrenches.
+    """
     assert attached.joint is not None
     f, m = state.wrenches[attached.joint]
     V, w = frame_velocity(attached.frames[1], state.velocities)

@@ -268,9 +268,10 @@ def _sum_of(
 def _wave(
     kind: Literal["s", "c"], angle: tuple[tuple[int, int], ...], coefficient: Fraction
 ) -> Polynomial:
-    """Return coefficient times sine ("s") or cosine ("c") of an integer combination of angles.
+    """Return the polynomial of coefficient times the sine ("s") or cosine ("c") of an angle.
 
-    The sign of the first factor is made positive.
+    `angle` is an integer combination of variables, ((index, factor), ...). The sign of its first
+    factor is made positive.
     """
     if not angle:
         return {(): coefficient} if kind == "c" else {}
@@ -339,7 +340,10 @@ def _factored(polynomial: Polynomial) -> Factored:
 
 
 def _from_powers(terms: Mapping[tuple[int, ...], object], atoms: list[Atom]) -> Polynomial:
-    """Return the polynomial with given coefficients, by the exponents of the atoms."""
+    """Return the polynomial with given coefficients.
+
+    `terms` maps from the exponents of the `atoms`, in their order, to the coefficient of the term.
+    """
     return {
         tuple((atom, power) for atom, power in zip(atoms, powers, strict=True) if power): Fraction(
             str(coefficient)
@@ -537,7 +541,10 @@ def _singularities(system: System, chosen: Selection) -> Singularities:
 def _constant_and_factors(
     system: System, chosen: Selection, square: SquareJacobian, q: SX
 ) -> tuple[str, list[SingularFactor]]:
-    """Return the constant factor of a determinant as text, and its factors that depend on q."""
+    """Return the constant factor of a determinant as text, and its factors that depend on q.
+
+    The determinant is that of the Jacobian `square` of the selection `chosen`, at the symbols `q`.
+    """
     writer, variables = Writer(system), casadi.vertcat(q, system.p)
     number = Fraction(square.sign)
     powers: dict[str, int] = {}
@@ -601,7 +608,10 @@ def _scale(polynomial: Polynomial) -> tuple[Polynomial, Fraction]:
 
 
 def _product_text(number: Fraction, constants: dict[str, int]) -> str:
-    """Return a number times powers of constant expressions as text."""
+    """Return the text of `number` times powers of constant expressions.
+
+    `constants` maps from the text of an expression to its exponent.
+    """
     if not constants:
         return f"{float(number):.12g}"
     sign = "-" if number < 0 else ""
@@ -613,13 +623,16 @@ def _product_text(number: Fraction, constants: dict[str, int]) -> str:
 
 
 def _label(chosen: Selection, block: Block) -> str:
-    """Return a description of a block of the Jacobian that is not factored."""
+    """Return a description of a block of the selected Jacobian that is not factored."""
     names = ", ".join(chosen.names[column] for column in block.columns)
     return f"determinant of the {block.size} x {block.size} block of {names}"
 
 
 def _factor(system: System, chosen: Selection, number: int, q: SX, expression: SX) -> Function:
-    """Return ``singular_factor(q) -> value``: factor `number` of the determinant."""
+    """Return ``singular_factor(q) -> value``, the Function of factor `number` of a determinant.
+
+    `expression` is the factor at the symbols `q`; `chosen` selects the Jacobian.
+    """
 
     def build() -> tuple[Named, Named]:
         return [("q", q)], [("value", expression)]

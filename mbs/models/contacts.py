@@ -483,10 +483,10 @@ def effort_unit(part: ComponentInstance, law: Friction | Stop | OneWay) -> str:
 def _collect(
     system: System, rows: list[_ContactRow], element: ContactElement, q: SX, v: SX
 ) -> None:
-    """Add a contact element to a row with equal Jacobian, or append a new row, in place.
+    """Add a contact element to a row in `rows` with equal Jacobian, or append a row, in place.
 
-    A row has at most one stop and one friction. Raise ModelError if nothing moves the element, or
-    two stops act on one coordinate.
+    `q` and `v` are the symbols. A row has at most one stop and one friction. Raise ModelError if
+    nothing moves the element, or two stops act on one coordinate.
     """
     w = contact_velocity(system, element.law, q, v)
     E = SX(casadi.sparsify(casadi.jacobian(w, v)))
@@ -571,7 +571,11 @@ def _index(value: SX | None, q: SX) -> int | None:
 
 
 def _row_integral(system: System, row: _ContactRow, q: SX, v: SX) -> SX | None:
-    """Return an expression whose rate is the velocity of a contact row; None if unknown."""
+    """Return an expression (1, 1) of q whose rate is the velocity of a contact row.
+
+    For a rigid stop it is the gap. None if no such expression is known. `q` and `v` are the symbols
+    of the row.
+    """
     if row.stop is not None and isinstance(row.stop.law, Stop):
         return SX(row.stop.law.gap)
     at_rest = casadi.simplify(casadi.substitute(row.velocity, v, SX.zeros(system.nv)))
@@ -601,7 +605,11 @@ def _stack(values: Iterable[SX]) -> SX:
 
 
 def _law_column(elements: Sequence[ContactElement | None], *names: str) -> SX:
-    """Return (k, 1) of the first field in `names` of each law that is not None; 0 without a law."""
+    """Return one value (k, 1) per contact element: the first field in `names` that is not None.
+
+    The field is that of the law of the element. The value is 0 if there is none, or if the entry of
+    `elements` is None.
+    """
     values = []
     for element in elements:
         found = [getattr(element.law, name, None) for name in names] if element else []

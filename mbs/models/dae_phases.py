@@ -615,9 +615,10 @@ def _built(standing: Standing, explicit: Function, form: str, kept: tuple[int, .
 def _explicit_equations(
     standing: Standing, explicit: Function, kept: tuple[int, ...]
 ) -> tuple[DaeEquations, SX]:
-    """Return explicit equations of a phase (no z), and the forces f (3, n) of the planes.
+    """Return explicit equations of a contact phase (no z), and the forces f (3, n) of its planes.
 
-    x is [q; v; component states].
+    x is [q; v; component states]. `explicit` is the function of the accelerations of the phase
+    `standing`, and `kept` are the indices of its independent constraint rows.
     """
     system = standing.system
     s = symbols_of(system, "tree")
@@ -637,7 +638,11 @@ def _explicit_equations(
 
 
 def _forces(standing: Standing, kept: tuple[int, ...], z: SX) -> SX:
-    """Return the forces (3, n) of the planes on the points, from lam in z = [a; lam; mu]."""
+    """Return the forces (3, n) of the planes on the n points of the phase `standing`.
+
+    They are the elements of lam in z = [a; lam; mu] that belong to the constraint rows `kept`;
+    others are zero.
+    """
     closure, (distances, drifts) = standing.system.closure, split(kept)
     loops, slips = (len(closure.rows), len(closure.slips)) if closure else (0, 0)
     first = standing.system.nv + loops

@@ -471,7 +471,11 @@ def _choose(
     build: Callable[[str], Function],
     candidates: tuple[str, ...],
 ) -> Function:
-    """Return the model by a method, built by `build`; for "auto" the cheapest of `candidates`."""
+    """Return the model by the method `method`, made by `build`.
+
+    For "auto" it is the cheapest of the models by the methods `candidates`, cached with the key
+    `key`.
+    """
     if method != "auto":
         return build(method)
     function: Function = system.cached(
@@ -481,7 +485,11 @@ def _choose(
 
 
 def _outputs(of: str, s: ModelSymbols, names: tuple[str, ...], blocks: Blocks, value: SX) -> Named:
-    """Return named derivatives "d<of>_d<name>", followed by the value itself with name `of`."""
+    """Return the outputs of a model of derivatives as pairs (name, value).
+
+    They are the derivatives "d<of>_d<name>" in `blocks` for the inputs `names`, then `value` itself
+    with the name `of`.
+    """
     labels = [name if name in "zup" else name + s.suffix for name in names]
     pairs = zip(labels, names, strict=True)
     return [*((f"d{of}_d{label}", blocks[name]) for label, name in pairs), (of, value)]
@@ -539,7 +547,7 @@ def with_implicit_jacobian(system: System, ddm: Function) -> Function:
 
 
 def _require_ddm(system: System, ddm: Function) -> None:
-    """Raise ModelError unless `ddm` is the direct dynamic model of this open chain."""
+    """Raise ModelError unless the Function `ddm` is the direct dynamic model of this open chain."""
     if system.is_closed:
         raise ModelError(
             f"{system.name}: the implicit Jacobian is for open chains and this system has loops;"

@@ -114,10 +114,10 @@ def in_coordinates(system: System, q: SX, J: SX, coordinates: str) -> SX:
 
 
 def _tree_link(system: System, link: int, frame: str | int, number: int | None) -> int | None:
-    """Return a link index of the user (0 is the base) as a tree index (-1 is the base).
+    """Return the tree index (-1 is the base) of the link with the user's index `number` (0: base).
 
-    Raise ModelError if the link is not between the base and `link`, the link of the frame. None
-    stays.
+    Raise ModelError if it is not between the base and `link`, the tree index of the link of
+    `frame`. None if `number` is None.
     """
     if number is None:
         return None

@@ -75,7 +75,10 @@ def _join_angles(pair: Pair, algebra: Algebra, polynomial: Polynomial) -> Polyno
 
 
 def _factor_pairs(algebra: Algebra, monomial: Monomial, pair: Pair) -> Iterator[tuple[int, int]]:
-    """Yield pairs of factors: a sine or cosine of the first angle and one of the second."""
+    """Yield pairs of factors of a monomial: sine or cosine of the first and of the second angle.
+
+    `pair` are the two angles.
+    """
     known = {n: name for n in monomial if (name := angle(algebra, n)) in pair}
     for first, a in known.items():
         for second, b in known.items():
@@ -214,7 +217,10 @@ def _with_factor(algebra: Algebra, polynomial: Polynomial, number: int) -> Polyn
 def _quotient(
     algebra: Algebra, monomial: Monomial, coefficient: int, number: int
 ) -> Polynomial | None:
-    """Return the term (monomial times coefficient) divided by a node; None if it is no factor."""
+    """Return the term (monomial times coefficient) divided by the node `number`.
+
+    None if the node is no factor of the term.
+    """
     if number in monomial:
         return {without(monomial, number): coefficient}
     sign, unsigned = algebra.builder.unsigned(coefficient)

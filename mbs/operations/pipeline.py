@@ -528,6 +528,10 @@ def witness(function: Function, seed: int = 0) -> Witness:
 
 
 def _evaluated(function: Function, point: Sequence[DM]) -> Values:
+    """Return the non-zero elements of each output of a Function at a point.
+
+    `point` has one value per input.
+    """
     outputs = Function.call(function, list(point))
     return tuple(np.array(DM(output).nonzeros(), dtype=float) for output in outputs)
 

@@ -61,11 +61,11 @@ class Infix:
         return f"({text})" if own < tightness else text
 
     def _write(self, number: int) -> tuple[str, int]:
-        """Return the text of a node and its binding strength."""
+        """Return the text of the node `number` and its binding strength: higher binds tighter."""
         return self._expression(self._graph.nodes[number])
 
     def _expression(self, node: Node) -> tuple[str, int]:
-        """Return the text of a node and its binding strength."""
+        """Return the text of a node and its binding strength: higher binds tighter."""
         if node.op == casadi.OP_CONST:
             return f"{node.value:.12g}", ATOM if node.value >= 0 else NEGATIVE
         if node.op == casadi.OP_INPUT:

@@ -510,10 +510,11 @@ def arm_from(target: VelocityTarget, reference: int | None) -> SX:
 def _ranked_choices(
     found: JacobianSamples, intermediate: int | None, reference: int | None
 ) -> list[tuple[int, int | None]]:
-    """Return pairs (axes, reference link) in the order of the expected cost of the Jacobian.
+    """Return pairs (axes, reference) of links for the Jacobian, in the order of its expected cost.
 
-    The key is the number of varying, then of nonzero entries of J. `intermediate` and `reference`
-    are links that are fixed, or None.
+    The cost is the number of varying, then of nonzero entries in the samples `found`. `reference`
+    None is the origin of the moving frame. A given `intermediate` fixes the axes, a given
+    `reference` the reference link.
     """
     links = [found.frames[k][0] for k in found.on_path]
     places = spread(found.on_path)

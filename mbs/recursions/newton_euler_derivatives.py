@@ -582,7 +582,7 @@ def _through_base(
 def _set_own(
     result: EffortDerivatives, k: int, start: int, lines: tuple[Line, ...], column: EffortColumn
 ) -> None:
-    """Set row k of the derivatives at the columns of a joint, in place.
+    """Set row k of the derivatives `result` at the columns of a joint, in place.
 
     `start` is the index of the first velocity of the joint, `lines` are its unit motions, and
     `column` has the derivatives by velocity k.
@@ -607,10 +607,10 @@ def _turn_row(
 def _set_pairs(
     result: EffortDerivatives, k: int, start: int, lines: tuple[Line, ...], column: EffortColumn
 ) -> None:
-    """Set the entries of velocity k with an ancestor joint, in place, in both triangles.
+    """Set the entries of `result` for velocity k and an ancestor joint, in place.
 
-    `start` is the index of the first velocity of the ancestor joint, `lines` are its unit motions,
-    and `column` has the derivatives by velocity k in the same axes.
+    Both triangles are set. `start` is the index of the first velocity of the ancestor joint,
+    `lines` are its unit motions, and `column` has the derivatives by velocity k in the same axes.
     """
     _set_own(result, k, start, lines, column)
     for h, line in enumerate(lines, start):

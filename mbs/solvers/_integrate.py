@@ -305,7 +305,7 @@ def run_problem(
 
 
 def _no_check() -> None:
-    pass
+    """Do nothing: the check for control-C if Python itself raises KeyboardInterrupt."""
 
 
 def _event(run: Any, given: IntegrationProblem) -> IntegrationEvent:

@@ -311,7 +311,10 @@ def _first_output(function: casadi.Function, inputs: list[casadi.MX]) -> casadi.
 
 
 def _dense_function(name: str, inputs: list[casadi.MX], *outputs: casadi.MX) -> casadi.Function:
-    """Return a Function with dense outputs, expanded to scalar operations if possible."""
+    """Return the Function `name` of `inputs` with dense outputs.
+
+    It is expanded to scalar operations if possible.
+    """
     return _scalar(casadi.Function(name, inputs, [casadi.densify(value) for value in outputs]))
 
 

@@ -294,7 +294,10 @@ def spans(ring: Ring, q: SX, p: SX) -> Iterator[RigidLink]:
 
 
 def _rigid_link(begun: Ring, one: Centre, other: Centre) -> RigidLink:
-    """Return rigid link from the centre `one`, at which the loop begins, to the next, `other`."""
+    """Return rigid link from the centre `one`, where a loop begins, to the next centre, `other`.
+
+    `begun` is the loop that begins at `one`.
+    """
     link = begun.gaps[one.count].pose
     after = one.count + other.count
     return RigidLink(

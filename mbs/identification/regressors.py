@@ -561,6 +561,8 @@ class JointColumns:
         """Return the joint efforts (nv, 1) of a unit parameter that acts on its own joint only.
 
         v and a are (nv, 1) joint velocities and accelerations. Coupled motors act on two joints.
+
+        `column` is the parameter.
         """
         link, total = self.tree.links[column.link - 1], zeros(self.tree.nv)
         if column.kind == "offset":

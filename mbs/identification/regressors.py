@@ -522,7 +522,7 @@ class JointColumns:
         return total
 
     def remaining_effort(self, column: Column) -> SX:
-        """Return the efforts that are not the rate of `momentum` (nv, 1), per unit of a parameter.
+        """Return the efforts (nv, 1) apart from the rate of `momentum`, per unit of a parameter.
 
         These are the joint efforts minus the time derivative of the generalised momentum.
 

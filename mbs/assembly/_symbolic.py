@@ -378,7 +378,10 @@ def _joint(row: JointRow, cuts: Sequence[Cut], given: _Given) -> JointRow:
 
 
 def _moved_frames(cut: Cut, given: _Given) -> Iterator[tuple[Frame, Frame]]:
-    """Yield each frame of a cut joint with symbols, before and after the substitution."""
+    """Yield each frame of a cut joint with symbols, before and after the substitution.
+
+    `given` maps (joint, side) to the symbols of a frame position.
+    """
     for side, (link, pose) in zip("ab", cut.frames, strict=True):
         values = given.get((cut.edge.joint.name, side), {})
         if values:

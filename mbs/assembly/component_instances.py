@@ -374,6 +374,8 @@ def _moment_arm(
 
     `factor` is the derivative of the port's value; `tables` are the coordinates of q, of v, and of
     cut joints. Raises AssemblyError if the coordinate is unknown.
+
+    `part` is the component.
     """
     coordinates, speeds, cut = tables
     q, v = ([row.name for row in table] for table in (coordinates, speeds))

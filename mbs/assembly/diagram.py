@@ -575,7 +575,10 @@ def _path_down(node: PlacedNode, pill: PlacedEdge) -> str:
 
 
 def _path_beside(pill: PlacedEdge, other: PlacedNode, lane: float) -> str:
-    """Return the SVG path from a cut joint along the right side (x = lane) up to link `other`."""
+    """Return the SVG path from a cut joint along the right side (x = lane) up to link `other`.
+
+    `pill` is the cut joint; all lengths are in px.
+    """
     foot, side = pill.y + PILL / 2, other.x + other.width / 2
     low = foot + 12
     return (
@@ -589,6 +592,8 @@ def _path_to_bottom(pill: PlacedEdge, other: PlacedNode, order: int, placed: Lay
 
     It ends at the side of the link if joints are drawn below it. `order` is the number of such
     lines to this link, from 1.
+
+    `pill` is the cut joint.
     """
     foot = pill.y + PILL / 2
     busy = any(edge.edge.ends[0] == other.node.number for edge in (*placed.tree, *placed.cuts))

@@ -213,6 +213,8 @@ def _welded_to(
     """Return every port that is welded to `start`, with its pose relative to `start`.
 
     Raises AssemblyError if two paths of welds give different poses.
+
+    `welds` lists the welded ports of each port; `at` evaluates expressions.
     """
     members = {start: Pose.identity()}
     queue = deque([start])

@@ -134,7 +134,7 @@ def khalil_frames(
     home: dict[int, int] = {0: -1}
     base = {0: Pose.identity()}
     stubs: dict[int, int] = {}
-    for branch in (*spanning.branches, *_keep(spanning)):
+    for branch in (*spanning.branches, *_branches_with_free_end(spanning)):
         last, pose = _extend(drafts, base, home[branch.parent], branch)
         if branch.child < 0:
             stubs[id(branch.edge)] = last
@@ -175,10 +175,12 @@ def khalil_frames(
     return KhalilTree(tree, tuple(draft.joint for draft in drafts), tuple(cuts), homes)
 
 
-def _keep(spanning: SpanningTree) -> list[Branch]:
+def _branches_with_free_end(spanning: SpanningTree) -> list[Branch]:
     """Return the branches of cut joints that stay in the tree with a free end.
 
     These are joints with an effort, and joints without closure rows.
+
+    `spanning` is the spanning tree.
     """
     return [
         Branch(edge, edge.a, -1, True)
@@ -295,7 +297,10 @@ def _links(
     rotors: list[CarriedRotor | None],
     symbols: Mapping[str, SX],
 ) -> tuple[Link, ...]:
-    """Return the links of a tree from their descriptions, chosen frames, inertias and rotors."""
+    """Return the links of a tree from their descriptions, chosen frames, inertias and rotors.
+
+    The lists have one element for each link; `symbols` are those of the parameters.
+    """
     links, nq, nv = [], 0, 0
     for draft, frame, inertia, rotor in zip(drafts, chosen, inertias, rotors, strict=True):
         motion = draft.motion

@@ -372,6 +372,8 @@ class ModelFunction(Function):
         """Return an input as CasADi accepts it: finite numbers of the right size, or symbols.
 
         Raises ModelError for any other value.
+
+        `name` is the name of the input.
         """
         if isinstance(value, (list, tuple)) and any(isinstance(e, (SX, MX, DM)) for e in value):
             value = casadi.vertcat(*value)
@@ -467,7 +469,10 @@ class ModelFunction(Function):
         raise ModelError(f"{self._title}: {broken.sentence}")
 
     def _verify(self, inputs: dict[str, Any], outputs: Any) -> None:
-        """Raise an error if the configuration check finds numeric outputs inaccurate."""
+        """Raise an error if the configuration check finds numeric outputs inaccurate.
+
+        `inputs` and `outputs` are the values of one evaluation.
+        """
         check = self._check_configuration
         every = outputs if isinstance(outputs, tuple) else (outputs,)
         if check is None or check.verify is None or not all(isinstance(o, DM) for o in every):
@@ -506,7 +511,10 @@ def _dm(array: NDArray[np.float64]) -> DM:
 
 
 def _columns(value: DM | SX | MX | None, rows: int) -> NDArray[np.float64] | None:
-    """Return the columns (rows, n) of an input; None if it is symbolic or has another size."""
+    """Return the columns (rows, n) of an input; None if it is symbolic or has another size.
+
+    `value` is the input.
+    """
     if not isinstance(value, DM) or rows == 0:
         return None
     full = value.full()

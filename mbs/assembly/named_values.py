@@ -158,6 +158,8 @@ def _filled(
 
     `what` is the quantity in error messages. Raises ModelError for an unknown name or a wrong
     number of values.
+
+    `coordinates` name the elements of the list.
     """
     names = [coordinate.name for coordinate in coordinates]
     if values is None:

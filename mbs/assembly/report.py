@@ -69,7 +69,7 @@ def followed(joints: Sequence[str]) -> str:
 
 
 def _loops(system: SystemData) -> list[str]:
-    """Return the lines on loops, couplings, mobility and motors."""
+    """Return the lines of the report on loops, couplings, mobility and motors."""
     if system.closure is None:
         return ["No loop: every coordinate is independent."]
     closure = system.closure

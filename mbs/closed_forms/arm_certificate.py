@@ -90,6 +90,8 @@ def _completed(transforms: Array, loop: Arrangement, middle: Complex) -> Complex
     """Return arm configurations (m, 6) for positions (n, 3) of joints 3, 4 and 5 of its loop.
 
     `transforms` (6, 4, 4) are the constant transforms of the loop.
+
+    `loop` is the loop of the arm, `middle` are the positions (n, 3).
     """
     beyond, goal = (
         np.tile(transforms[1].astype(np.complex128), (len(middle), 1, 1)),
@@ -118,7 +120,10 @@ def _angle(c: Complex, s: Complex) -> Complex:
 
 
 def _first_positions(prismatic: bool, near: Complex, goal: Array) -> Complex:
-    """Return positions (n,) of joint 1 that move origin and z axis of poses `near` to `goal`."""
+    """Return positions (n,) of joint 1 that move origin and z axis of poses `near` to `goal`.
+
+    `near` are poses (n, 4, 4), `goal` is the target pose; `prismatic` is the type of joint 1.
+    """
     if prismatic:
         slide: Complex = goal[2, 3] - near[:, 2, 3]
         return slide
@@ -153,7 +158,10 @@ def _second_positions(
 
 
 def _crossings(prismatic: bool, n: Complex, g: Complex) -> tuple[Complex, Complex]:
-    """Return both roots q of n0 cos q + n1 sin q = g, or of n0 q + n1 q^2 = g if prismatic."""
+    """Return both roots q of n0 cos q + n1 sin q = g, or of n0 q + n1 q^2 = g if prismatic.
+
+    n (m, 2) are the factors and g (m,) the right sides.
+    """
     if not prismatic:
         # (n0 - i n1) z^2 - 2 g z + n0 + i n1 = 0 with z = e^(i q)
         root, below = np.sqrt(g**2 - n[:, 0] ** 2 - n[:, 1] ** 2), n[:, 0] - 1j * n[:, 1]
@@ -243,7 +251,10 @@ def certified_roots(arm: Arm, T: Array, candidates: Complex) -> CertifiedRoots:
 
 
 def _without_base_and_tool(arm: Arm, T: Array, length: float) -> tuple[Arm, Array]:
-    """Return the arm from its first to its last joint, and its target, in units of `length`."""
+    """Return the arm from its first to its last joint, and its target, in units of `length`.
+
+    T (4, 4) is the target pose of the whole arm [m].
+    """
     first, last = inverse(arm.gaps[0]), inverse(arm.gaps[-1])
     gaps, target = arm.gaps.copy(), first @ T @ last
     gaps[0], gaps[-1] = np.eye(4), np.eye(4)

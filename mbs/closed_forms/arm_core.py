@@ -501,7 +501,10 @@ def _c_array(T: Array, *shape: int) -> Array:
 
 
 def _targets(T: Array, count: int) -> Array:
-    """Return target poses as an array for C: (4, 4) for all configurations, or (count, 4, 4)."""
+    """Return target poses as an array for C: (4, 4) for all configurations, or (count, 4, 4).
+
+    T is one pose (4, 4) or the poses (count, 4, 4).
+    """
     return _c_array(T, *((4, 4) if np.ndim(T) == 2 else (count, 4, 4)))
 
 

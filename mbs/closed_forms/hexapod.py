@@ -538,6 +538,9 @@ def _refined_poses(a: Real, b: Real, square: Real, e: Real, p: Real) -> tuple[Re
     """Refine real poses by Newton's method; return e, p, and errors of squared lengths (r,).
 
     Steps without improvement are halved, because their length has no bound at a fold.
+
+    e (r, 4) are quaternions, p (r, 3) positions; a, b (6, 3) are the leg ends and `square` (6,) the
+    squared lengths.
     """
     share = np.ones(len(e))
     value, J = _slopes(a, b, e, p)

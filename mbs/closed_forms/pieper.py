@@ -370,6 +370,8 @@ def _quadratic_root(factors: list[SX], sign: SX, length: SX, unit: SX) -> Root:
     """Return the root of a r^2 + b r + c = 0 on the side `sign` of the mean of both roots.
 
     `factors` are a, b, c. It is finite for any a.
+
+    `length` is a typical length of the root, `unit` the typical size of the terms.
     """
     a, b, c = factors[0] * length**2 / unit, factors[1] * length / unit, factors[2] / unit
     inverse = a / (a * a + _SMALL)
@@ -531,7 +533,11 @@ def _second_prismatic(reach: PointTarget) -> list[SequenceStep] | None:
 def _two_displacements(
     reach: PointTarget, along: tuple[SX, SX], left: tuple[SX, SX]
 ) -> list[SequenceStep] | None:
-    """Return the steps of joints 3 and 2 from two equations along[k] x2 = left[k], k = 0, 1."""
+    """Return the steps of joints 3 and 2 from two equations along[k] x2 = left[k], k = 0, 1.
+
+    `along` are scalar factors of the displacement x2, `left` are forms (3, 1) in joint 3. None if
+    they do not determine the joints.
+    """
     loop, sign = reach.loop, reach.loop.ring.joints[1].sign
     third = root_of_form(loop, 2, along[1] * left[0] - along[0] * left[1], loop.length)
     if third is None:

@@ -43,6 +43,9 @@ def three_revolute(ring: Ring) -> LoopBranches:
     Args:
         ring: loop chain with the joints a, b, c, where c may be spherical. The branch is the sign
             of joint b.
+
+    Returns:
+        Branches: expressions of the joint positions for each solution, by its label.
     """
     return LoopBranches(
         {label: _three_revolute_root(ring, sign) for label, sign in signed(ring.joints[1])}
@@ -76,6 +79,9 @@ def one_prismatic(ring: Ring) -> LoopBranches:
 
     Args:
         ring: loop chain with the joints a, b, c, where b is prismatic and c may be spherical.
+
+    Returns:
+        Branches: expressions of the joint positions for each solution, by its label.
     """
     return LoopBranches(
         {label: _one_prismatic_root(ring, sign) for label, sign in signed(ring.joints[1])}
@@ -104,6 +110,9 @@ def two_prismatic(ring: Ring) -> LoopBranches:
 
     Args:
         ring: loop chain with the joints a, b, c, where a is revolute.
+
+    Returns:
+        Branches: expressions of the joint positions for each solution, by its label.
     """
     X1, X2, X3 = (gap.pose for gap in ring.gaps)
     R = X2.R @ X3.R
@@ -127,6 +136,9 @@ def parallelogram(ring: Ring, pivot: int) -> LoopBranches:
     Args:
         ring: loop chain with the joints a, b, c, where b is opposite to the known axis.
         pivot: index of the known axis among the known revolute joints from c to a.
+
+    Returns:
+        Branches: expressions of the joint positions for each solution, by its label.
     """
     name = ring.joints[1].name
     X1 = ring.gaps[0].pose
@@ -165,6 +177,9 @@ def planar(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
         ring: loop chain.
         q: symbols of positions.
         p: symbols of parameters.
+
+    Returns:
+        Branches: expressions of the joint positions for each solution, by its label.
     """
     ring = with_spherical(ring, q, p)
     spherical = sum(joint.motion is _SPHERICAL for joint in ring.joints)
@@ -246,6 +261,9 @@ def along_normal(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
         ring: loop chain.
         q: symbols of positions.
         p: symbols of parameters.
+
+    Returns:
+        Branches: expressions of the joint positions for each solution, by its label.
     """
     ring = with_spherical(ring, q, p)
     kinds = [joint.motion for joint in ring.joints]

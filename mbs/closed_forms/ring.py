@@ -145,7 +145,10 @@ def _spins(system: System) -> dict[int, Spin]:
 
 
 def _append_cut_joint(builder: ChainBuilder, system: System, number: int) -> None:
-    """Append the freedoms of cut joint `number` to the chain, from its frame_b to its frame_a."""
+    """Append the freedoms of cut joint `number` to the chain, from its frame_b to its frame_a.
+
+    `builder` is the chain under construction.
+    """
     joint = system.cuts[number].edge.joint
     spherical = ChainJoint(joint.name, Motion.SPHERICAL, None, -1, cut=True)
     freedoms = joint.freedoms
@@ -352,7 +355,10 @@ def _first_revolute(ring: Ring) -> int | None:
 
 
 def _normal(gaps: list[Matrix], start: int, end: int) -> Matrix:
-    """Return the axis (3,) of joint `start` in the frame of joint `end`, with joints at zero."""
+    """Return the axis (3,) of joint `start` in the frame of joint `end`, with joints at zero.
+
+    `gaps` are the known transforms (4, 4) of the loop.
+    """
     normal, n = _Z, len(gaps)
     for k in range(start + 1, end + 1 if end > start else end + n + 1):
         normal = gaps[k % n][:3, :3].T @ normal
@@ -360,7 +366,10 @@ def _normal(gaps: list[Matrix], start: int, end: int) -> Matrix:
 
 
 def _fits_plane(motion: Motion, normal: Matrix) -> bool:
-    """Whether a joint can move in a plane with this normal (3,) in the joint frame."""
+    """Whether a joint can move in a plane with this normal (3,) in the joint frame.
+
+    `motion` is the type of the joint.
+    """
     if motion is Motion.SPHERICAL:
         return True
     cosine = abs(float(normal[2]))

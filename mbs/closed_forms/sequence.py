@@ -235,7 +235,10 @@ class StepSequence:
 
 
 def _after_step(leaf: Leaf, step: SequenceStep, given: SX, s: SX) -> Leaf:
-    """Return the configuration after a further step with signs s."""
+    """Return the configuration after a further `step`, with signs s that select its root.
+
+    `leaf` is the configuration before, `given` are the known quantities.
+    """
     values, real, regular, coefficients = step.function(leaf.x, given, s)
     x = SX(leaf.x)
     x[list(step.indices)] = values

@@ -56,6 +56,9 @@ def aim(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
         ring: loop chain.
         q: symbols of positions.
         p: symbols of parameters.
+
+    Returns:
+        Branches: expressions of the joint positions for each solution, by its label.
     """
     n = len(ring.joints)
     found = centres(ring, q, p)
@@ -114,6 +117,9 @@ def spherical(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
         ring: loop chain.
         q: symbols of positions.
         p: symbols of parameters.
+
+    Returns:
+        Branches: expressions of the joint positions for each solution, by its label.
     """
     joint = ring.joints[0]
     if len(ring.joints) != 1 or joint.motion is not Motion.SPHERICAL or joint.index is None:
@@ -168,6 +174,9 @@ def confine(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
         ring: loop chain with one spherical joint and three other unknown joints.
         q: symbols of positions.
         p: symbols of parameters.
+
+    Returns:
+        Branches: expressions of the joint positions for each solution, by its label.
     """
     ring = with_spherical(ring, q, p)
     spherical = [k for k, joint in enumerate(ring.joints) if joint.motion is Motion.SPHERICAL]
@@ -294,7 +303,10 @@ def spans(ring: Ring, q: SX, p: SX) -> Iterator[RigidLink]:
 
 
 def _rigid_link(begun: Ring, one: Centre, other: Centre) -> RigidLink:
-    """Return rigid link from the centre `one`, at which the loop begins, to the next, `other`."""
+    """Return rigid link from the centre `one`, where a loop begins, to the next centre, `other`.
+
+    `begun` is the loop that begins at `one`.
+    """
     link = begun.gaps[one.count].pose
     after = one.count + other.count
     return RigidLink(
@@ -312,6 +324,9 @@ def at_distance(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
         ring: loop chain.
         q: symbols of positions.
         p: symbols of parameters.
+
+    Returns:
+        Branches: expressions of the joint positions for each solution, by its label.
     """
     for span in spans(ring, q, p):
         if len(span.chain.joints) == 1:
@@ -364,6 +379,9 @@ def free_body(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
         ring: loop chain.
         q: symbols of positions.
         p: symbols of parameters.
+
+    Returns:
+        Branches: expressions of the joint positions for each solution, by its label.
     """
     joint = ring.joints[0]
     if len(ring.joints) != 1 or joint.motion is not Motion.FREE or joint.index is None:
@@ -388,6 +406,9 @@ def orientations(ring: Ring) -> LoopBranches:
 
     Args:
         ring: loop chain with the joints a, b, c, where b is the joint in the middle.
+
+    Returns:
+        Branches: expressions of the joint positions for each solution, by its label.
     """
     return LoopBranches(
         {label: _orientations_root(ring, sign) for label, sign in signed(ring.joints[1])}
@@ -423,12 +444,15 @@ def _orientations_root(ring: Ring, sign: int) -> Positions:
 
 
 def orientation(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
-    """Return the revolute joints that orientations alone determine; None if there are none.
+    """Return the positions of revolute joints that orientations alone determine; None without any.
 
     Args:
         ring: loop chain.
         q: symbols of positions.
         p: symbols of parameters.
+
+    Returns:
+        Branches: position expressions in q and p of each solution, by its label.
     """
     if any(joint.motion not in (Motion.REVOLUTE, Motion.PRISMATIC) for joint in ring.joints):
         return None
@@ -514,6 +538,9 @@ def prismatic(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
         ring: loop chain.
         q: symbols of positions.
         p: symbols of parameters.
+
+    Returns:
+        Branches: expressions of the joint positions for each solution, by its label.
     """
     number = sum(joint.motion is Motion.PRISMATIC for joint in ring.joints)
     if not 1 <= number <= _MOST:
@@ -567,6 +594,9 @@ def spin(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
         ring: loop chain.
         q: symbols of positions, with the spin of the rod.
         p: symbols of parameters.
+
+    Returns:
+        Branches: expressions of the joint positions for each solution, by its label.
     """
     ring = with_spherical(ring, q, p)
     for first, joint in enumerate(ring.joints):
@@ -688,6 +718,9 @@ def point_on_links(name: str, spans: Sequence[RigidLink]) -> LoopBranches:
     Args:
         name: prefix of the labels of both branches.
         spans: links, as many as prismatic joints in each loop.
+
+    Returns:
+        Branches: expressions of the joint positions for each solution, by its label.
     """
     indices = sorted(prismatic_indices(spans[0]) or ())
     spheres = [_sphere(span, indices) for span in spans]
@@ -753,6 +786,9 @@ def bennett(ring: Ring, q: SX, p: SX) -> LoopBranches | None:
         ring: loop chain.
         q: symbols of positions.
         p: symbols of parameters.
+
+    Returns:
+        Branches: expressions of the joint positions for each solution, by its label.
     """
     revolute = all(joint.motion is Motion.REVOLUTE for joint in ring.joints)
     if len(ring.joints) != 3 or not revolute:

@@ -327,6 +327,8 @@ def _after_tree_rules(
 
     `indices` maps (link index, kind) to the column index. A rule is skipped if one of its
     parameters has no column.
+
+    `structure` contains the joint axes on which the rules depend.
     """
     for removal in tree_rules(structure):
         dropped, terms = indices.get(removal.parameter), _by_column_index(removal.effects, indices)

@@ -407,6 +407,8 @@ def _instrumental_covariance(
 
     `inverse` (k, k) is (Z' W)^-1, `weights` (m,) are those of the efforts and `error` (n, m) the
     residuals, whose deviation may differ between efforts.
+
+    `instruments` Z (n, m, k) replace the observation matrix W.
     """
     n, m = error.shape
     left = max(n - inverse.shape[0] / m, 1.0)

@@ -527,7 +527,7 @@ class JointColumns:
         return total
 
     def remaining_effort(self, column: Column) -> SX:
-        """Return the efforts that are not the rate of `momentum` (nv, 1), per unit of a parameter.
+        """Return the efforts (nv, 1) apart from the rate of `momentum`, per unit of a parameter.
 
         These are the joint efforts minus the time derivative of the generalised momentum.
 
@@ -566,6 +566,8 @@ class JointColumns:
         """Return the joint efforts (nv, 1) of a unit parameter that acts on its own joint only.
 
         v and a are (nv, 1) joint velocities and accelerations. Coupled motors act on two joints.
+
+        `column` is the parameter.
         """
         link, total = self.tree.links[column.link - 1], zeros(self.tree.nv)
         if column.kind == "offset":

@@ -481,6 +481,8 @@ def _joint_range(system: System, quantity: str, value: Range, name: str) -> tupl
     """Return the lower and upper limit of one quantity of the joint `name`.
 
     A number is symmetric, None is unlimited. Raises ModelError for an empty or infinite range.
+
+    `value` is the limit of the user, `quantity` its name in messages.
     """
     if value is None:
         return -np.inf, np.inf

@@ -410,7 +410,10 @@ class Batch:
         return rows[0][1] if rows else None
 
     def _results(self, out: Any, states: int | None) -> list[Array]:
-        """Return the arrays of the outputs: new arrays, or `out` after a check."""
+        """Return the arrays of the outputs: new arrays, or `out` after a check.
+
+        `states` is the number of states, None for a single state.
+        """
         if out is None:
             return [port.empty(states) for port in self.outputs]
         arrays = list(out) if isinstance(out, (tuple, list)) else [out]
@@ -482,7 +485,10 @@ class Batch:
             thread.join()
 
     def _interpret(self, given: Sequence[Array], results: Sequence[Array], states: int) -> None:
-        """Evaluate all states by a map of the CasADi Function, and write them to `results`."""
+        """Evaluate all states by a map of the CasADi Function, and write them to `results`.
+
+        `given` are the arrays of the inputs.
+        """
         columns = []
         for x, port in zip(given, self.inputs, strict=True):
             every = x.reshape(-1, port.size) if x.size or port.size else np.zeros((1, 0))

@@ -195,6 +195,8 @@ class ArrayCalls:
         """Return the result of the built-in callable; None if it does not support the arguments.
 
         `out` is None, an array or a tuple of arrays.
+
+        `args` are the arguments of the call.
         """
         if len(args) != self._inputs:
             if self._last is None or len(args) != self._inputs - 1:

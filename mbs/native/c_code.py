@@ -578,7 +578,10 @@ class BlockCode:
         return f"{self.graph.name}_repeat{list(self.where.tables).index(repeat)}"
 
     def _access_comment(self, repeat: Repeat) -> str:
-        """Return comment text that names the inputs and outputs that a sequence accesses."""
+        """Return comment text that names the inputs and outputs that a sequence accesses.
+
+        `repeat` is the sequence.
+        """
         taken = {n for column in repeat.taken for n in column.nodes}
         given = {n for column in repeat.given for n in column.nodes}
         nodes = (self.graph.nodes[n] for n in taken)

@@ -122,7 +122,10 @@ def _words(command: str) -> tuple[str, ...]:
 
 
 def _probe(command: tuple[str, ...], path: str) -> Compiler | None:
-    """Return the compiler that `command` starts; None if its --version fails."""
+    """Return the compiler that `command` starts; None if its --version fails.
+
+    `path` is the search path of programs.
+    """
     program = shutil.which(command[0], path=path)
     if program is None:
         return None

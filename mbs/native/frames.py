@@ -276,7 +276,10 @@ def _switch_function(kind: str, name: str, answers: Sequence[str]) -> str:
 
 
 def _table(name: str, pattern: Sparsity) -> str:
-    """Return the C array of a sparsity pattern in CasADi's compressed format."""
+    """Return the C array of a sparsity pattern in CasADi's compressed format.
+
+    `name` is the name of the array.
+    """
     dense = pattern.is_dense()
     numbers = [*pattern.shape, 1] if dense else [int(k) for k in pattern.compress()]
     values = ", ".join(map(str, numbers))

@@ -40,7 +40,10 @@ def _blocks(function: Function) -> list[Sparsity]:
 
 
 def _pattern(name: str, patterns: Iterable[Sparsity]) -> str:
-    """Return C arrays of the patterns, and the function jac_NAME_sparsity_out that returns them."""
+    """Return C arrays of the patterns, and the function jac_NAME_sparsity_out that returns them.
+
+    `patterns` are the sparsities of the blocks of the Jacobian, `name` that of the Function.
+    """
     blocks = [tuple(pattern.compress()) for pattern in patterns]
     names = {block: f"{name}_pattern{k}" for k, block in enumerate(blocks)}
     arrays = [

@@ -248,6 +248,8 @@ def _kept(places: Ints, length: int, used: Ints) -> tuple[int, int, list[int]]:
     """Return the saved lines, the length, and the start indices of occurrences without overlap.
 
     `used` counts the steps before each step that are part of chosen sequences already.
+
+    `places` are the start indices of all occurrences, `length` is the number of steps.
     """
     kept: list[int] = []
     end = -1

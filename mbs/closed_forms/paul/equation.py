@@ -215,7 +215,10 @@ def _without_known_sums(
 
 
 def _variables(terms: list[Members], prismatic: frozenset[int]) -> tuple[Variable, ...]:
-    """Return the variables of terms; joints whose angles have a constant ratio are one variable."""
+    """Return the variables of terms; joints whose angles have a constant ratio are one variable.
+
+    `terms` are products of powers of joint positions; `prismatic` are indices of prismatic joints.
+    """
     columns = dict[int, list[int]]()
     for number, term in enumerate(terms):
         for k, power in term:
@@ -306,7 +309,10 @@ def factor(knowledge: KnownFrames, matrices: RingMatrices, equation: Equation, k
 
 
 def _rotate(own: Factor, angle: SX, conjugate: bool) -> Factor:
-    """Return X and Y of G = X - i Y times e^i(angle), or of its conjugate."""
+    """Return X and Y of G = X - i Y times e^i(angle), or of its conjugate.
+
+    `own` contains X and Y; `conjugate` selects the conjugate of G.
+    """
     c, s = casadi.cos(angle), casadi.sin(angle)
     X, Y = own.X * c + own.Y * s, own.Y * c - own.X * s
     return Factor(SX(X), SX(-Y if conjugate else Y))
@@ -447,6 +453,9 @@ def _joint_matrix(knowledge: KnownFrames, k: int, number: int, direction: int) -
 
 @cache
 def _sparse_basis(turns: bool, sign: int) -> tuple[SX, SX, SX]:
-    """Return three basis matrices of a joint that moves with (sign 1) or against the path (-1)."""
+    """Return three basis matrices of a joint that moves with (sign 1) or against the path (-1).
+
+    They multiply 1, cos q, sin q, or 1, r, r^2. `turns` is whether the joint is revolute.
+    """
     one, first, second = (SX(casadi.sparsify(DM(matrix))) for matrix in motion_parts(not turns))
     return (one, first, sign * second) if turns else (one, sign * first, second)

@@ -192,6 +192,8 @@ def _equation_text(
     """Return the named coefficients of linear equations, and the equations as text.
 
     `table` contains the symbolic coefficients of each equation.
+
+    `variables` are the unknowns of the equations.
     """
     named, lines = dict[str, SX](), list[str]()
     for letter, row in zip(_letters(len(table)), table, strict=True):

@@ -315,7 +315,10 @@ def _multiplied(side: Side, matrix: Matrix) -> Side:
 
 
 def _with_joint(side: Side, k: int, basis: Tensor) -> Side:
-    """Return the side multiplied by the factors (3, d, d) of a further unknown joint k."""
+    """Return the side multiplied by the factors (3, d, d) of a further unknown joint k.
+
+    `basis` are the factors; k is the index of the joint.
+    """
     S, d, columns, K = side.values.shape
     moved = basis[:, None] @ side.values.reshape(S, d, -1)
     values = np.moveaxis(moved.reshape(3, S, d, columns, K), 0, -1)
@@ -477,7 +480,10 @@ class _Table:
 
 @lru_cache(maxsize=4096)
 def _table(joints: tuple[int, ...], prismatic: frozenset[int]) -> _Table:
-    """Return the terms of a side with these joints: products of powers of joint variables."""
+    """Return the terms of a side with these joints: products of powers of joint variables.
+
+    `joints` are indices of joints, and `prismatic` those of all prismatic joints.
+    """
     every = list(product((-1, 0, 1), repeat=len(joints)))
     terms = list[Members | None]()
     for row in every:

@@ -219,6 +219,8 @@ def _squared(B: Numbers, prismatic: bool) -> Numbers:
     """Return the coefficients of the square of B[0] + B[1] y + B[2] y^2 of a length y.
 
     For an angle, B multiplies 1, cos y, sin y, and the result multiplies 1, c, s, c2, s2.
+
+    `prismatic` is whether y is a length; c2 and s2 are cos 2y and sin 2y.
     """
     z, x, y = B
     if prismatic:
@@ -230,6 +232,8 @@ def _squared_magnitude(G: list[Complex], prismatic: bool) -> Numbers:
     """Return the coefficients of the squared magnitude of the complex form G in y.
 
     They have the order of `_squared`.
+
+    `prismatic` is whether y is a length.
     """
     if prismatic:
         parts = [_squared([part[k] for part in G], True) for k in (0, 1)]
@@ -280,6 +284,8 @@ def _quartic_step(stage: PaulStage, variable: Variable, F: list[SX], unit: int) 
     """Return the step of a quartic with coefficients F and four roots.
 
     `unit` is the power of a length that is the unit of F.
+
+    `variable` is the unknown.
     """
     number, shown = stage.number(variable), stage.term(variable)
     signs = SX.sym("sign", 2)

@@ -209,7 +209,10 @@ def _elimination(prismatic: Joints, elements: NDArray[np.int64], raised: int) ->
 
 
 def _joint_3_parts(slides: bool, count: int) -> tuple[Array, Array]:
-    """Return first `count` parts of joint 3 for its `weights`, and coefficients of the number 1."""
+    """Return first `count` parts of joint 3 for its `weights`, and coefficients of the number 1.
+
+    `slides` is whether joint 3 is prismatic.
+    """
     parts = motion_parts(slides)[:count]
     if not slides:
         return parts, np.array([1.0, 0.0, 0.0])
@@ -637,6 +640,8 @@ def _rotated_polynomial(M: Array) -> tuple[Array, Array]:
 
     The offset is the one of eight at which the last coefficient, the matrix at x = infinity, is
     best conditioned.
+
+    M are the parts (N, n3, n, n) of the matrix of joint 3.
     """
     offset = _OFFSETS[np.argmax(_far_regularities(M), axis=1)]
     if M.shape[1] == 2:

@@ -207,7 +207,10 @@ def resting_height(structure: Structure, j: int) -> SX | None:
 
 
 def _height_where_all_meet(structure: Structure, j: int, k: int) -> SX | None:
-    """Return the coordinate along axis j of its intersection with axis k [m]; None if it moves."""
+    """Return the coordinate along axis j of its intersection with axis k [m]; None if it moves.
+
+    `structure` contains the axes. j and k are link indices.
+    """
     axes = structure.axes
     between = structure.origins[:, k] - structure.origins[:, j]
     normal = np.cross(axes[:, j], axes[:, k])
@@ -341,7 +344,10 @@ def _revolute_rules(structure: Structure, j: int) -> Iterator[Removal]:
 
 
 def _is_on_fixed_line(structure: Structure, j: int) -> bool:
-    """Whether axis j is a fixed line, with zero gravity or gravity along it."""
+    """Whether axis j is a fixed line, with zero gravity or gravity along it.
+
+    j is the index of the link; `structure` contains axes and gravity.
+    """
     before = structure.before(j)
     return (
         structure.gravity_along(j)
@@ -454,7 +460,10 @@ def _mass_on_antecedent(link: Link) -> dict[Key, SX]:
 
 
 def _column(through: SX, name: str) -> SX:
-    """Return the column of a matrix (rows, 10) of the inertial parameter `name`, such as "XX"."""
+    """Return the column of a matrix (rows, 10) of the inertial parameter `name`, such as "XX".
+
+    `through` is the matrix, such as a transform of inertial parameters.
+    """
     return through[:, TEN_PARAMETERS.index(name)]
 
 

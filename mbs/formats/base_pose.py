@@ -22,12 +22,24 @@ POSE = "Z"
 
 
 def base_pose_texts(pose: Array) -> tuple[str, ...]:
-    """Return the texts of the vector for a pose (4, 4)."""
+    """Return the vector Z of a base pose as 16 texts.
+
+    Args:
+        pose: (4, 4) homogeneous matrix of the base in the world; its elements are written row by
+            row.
+    """
     return tuple(repr(float(value) + 0.0) for value in np.ravel(pose))
 
 
 def placement_pose(placement: Placement, values: Mapping[str, float]) -> Array | None:
-    """Return the pose (4, 4) of a mount; None if one of its symbols has no value."""
+    """Return the base pose in the world as a numeric matrix (4, 4).
+
+    None if a symbol of the placement has no value, or if an element is not finite.
+
+    Args:
+        placement: mount of the base on the world, which may contain symbols.
+        values: numeric values of the symbols, by name.
+    """
     names = {symbol.name for value in placement.expressions() for symbol in parameters_of(value)}
     if not names <= set(values):
         return None
@@ -37,7 +49,15 @@ def placement_pose(placement: Placement, values: Mapping[str, float]) -> Array |
 
 
 def base_placement(extras: Mapping[str, Sequence[str]]) -> tuple[Placement, list[ImportNote]]:
-    """Return the mount that a table contains, and a note if its vector is no pose in numbers."""
+    """Return the mount of the base on the world from the extra data of a table of frames.
+
+    Args:
+        extras: extra vectors of the table as texts; the vector "Z" has the 16 elements of the pose.
+
+    Returns:
+        The mount and the import notes. The mount is the identity if there is no vector "Z". If the
+        vector is not a numeric pose, the mount is the identity as well, and there is one note.
+    """
     texts = extras.get(POSE, ())
     values = [to_float(expression(text)) for text in texts]
     if not texts or values == np.eye(4).ravel().tolist():

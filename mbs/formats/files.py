@@ -27,6 +27,9 @@ _MARKS = {
 def read_bytes(path: str | Path) -> bytes:
     """Return the content of a file.
 
+    Args:
+        path: path of the file.
+
     Raises:
         DescriptionError: the argument is not a path, the file does not exist or is not a regular
             file, it has more than `LARGEST_FILE` bytes, or it cannot be read.
@@ -59,7 +62,10 @@ def read_bytes(path: str | Path) -> bytes:
 def read_text(path: str | Path) -> str:
     """Return the text of a file, decoded by its byte-order mark or as UTF-8.
 
-    Invalid bytes are replaced.
+    Each invalid byte becomes the replacement character U+FFFD.
+
+    Args:
+        path: path of the file.
 
     Raises:
         DescriptionError: the errors of `read_bytes`.
@@ -68,7 +74,13 @@ def read_text(path: str | Path) -> str:
 
 
 def decoded(content: bytes, encoding: str = "utf-8") -> str:
-    """Decode a text by its byte-order mark, or else with `encoding`. Invalid bytes are replaced."""
+    """Decode bytes by their byte-order mark, or with `encoding` if there is no such mark.
+
+    Each invalid byte becomes the replacement character U+FFFD.
+
+    Raises:
+        LookupError: `encoding` is unknown.
+    """
     for mark, name in _MARKS.items():
         if content.startswith(mark):
             return content.decode(name, errors="replace")
@@ -78,6 +90,7 @@ def decoded(content: bytes, encoding: str = "utf-8") -> str:
 def component_name(text: str) -> str:
     """Return a valid component name: the text with blanks, dots and quotes replaced by underscores.
 
-    Invisible characters are removed, and the name is cut to `LONGEST_NAME` characters.
+    Invisible characters are removed, and the name is cut to `LONGEST_NAME` characters. The name is
+    empty if nothing remains.
     """
     return seen(_NOT_IN_NAMES.sub("_", text.strip()))[:LONGEST_NAME]

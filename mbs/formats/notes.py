@@ -25,7 +25,7 @@ class Notes:
     taken: list[ImportNote] = field(default_factory=list)
 
     def add(self, kind: NoteKind, element: str, text: str, line: int | None = None) -> None:
-        """Add a note.
+        """Add a note; with `strict`, raise it as an error instead.
 
         Args:
             kind: kind of the note.

@@ -232,12 +232,15 @@ class RobotTable:
         return frozenset(symbol.name for scalar in scalars for symbol in parameters_of(scalar))
 
     def joint_name(self, j: int) -> str:
-        """Return the name of the joint of frame j."""
+        """Return the name of the joint of frame j (from 1): the name in its row, or q<j>."""
         return self.frames[j - 1].name or f"q{j}"
 
 
 def require_table(table: object) -> None:
-    """Raise if the argument is not a table of frames.
+    """Raise if the argument is not a table of frames (`RobotTable`).
+
+    Args:
+        table: argument of a function.
 
     Raises:
         DescriptionError: the argument is a mechanism, a system or another object.
@@ -253,12 +256,16 @@ Row = TypeVar("Row", FrameRow, InertiaRow)
 
 
 def _with_scalars(where: str, row: Row, names: tuple[str, ...]) -> Row:
+    """Return the row with the fields `names` as expressions; `where` is for error messages."""
     values: dict[str, Any] = {n: expression(getattr(row, n), f"{where}, {n}") for n in names}
     return replace(row, **values)
 
 
 def _bare(row: Row, names: tuple[str, ...]) -> Row:
-    """Return the row with symbols without default values, which are stored in the table."""
+    """Return the row with symbols without default values, which are stored in the table.
+
+    `names` are the scalar fields of the row.
+    """
     values: dict[str, Any] = {n: expression(str(getattr(row, n))) for n in names}
     if isinstance(row, InertiaRow):
         values["frame"] = int(row.frame) if _is_int(row.frame) else row.frame
@@ -267,6 +274,7 @@ def _bare(row: Row, names: tuple[str, ...]) -> Row:
 
 
 def _bare_scalars(rotor: Rotor) -> dict[str, Expression]:
+    """Return inertia and ratio of a rotor as expressions without default values, by name."""
     return {name: expression(str(getattr(rotor, name))) for name in ("inertia", "ratio")}
 
 
@@ -277,6 +285,10 @@ def _plain_cut(loop: CutRow) -> CutRow:
 
 
 def _checked_frame(where: str, j: int, row: FrameRow) -> FrameRow:
+    """Return row j with its values as expressions and numbers.
+
+    Raise a DescriptionError that begins with `where` if the row is inconsistent.
+    """
     if not _is_int(row.sigma) or row.sigma not in (0, 1, 2):
         raise DescriptionError(
             f"{where}: sigma is {row.sigma!r}; use 0 (revolute), 1 (prismatic) or 2 (fixed)"
@@ -303,6 +315,7 @@ def _checked_frame(where: str, j: int, row: FrameRow) -> FrameRow:
 
 
 def _limits(where: str, limits: Any) -> tuple[float, float]:
+    """Return (lower, upper) of joint limits; raise a DescriptionError if they are not ordered."""
     pair = list(limits) if isinstance(limits, (list, tuple, np.ndarray)) else []
     numbers = [number(value, f"{where}: limits") for value in pair]
     if len(numbers) != 2 or not numbers[0] < numbers[1]:
@@ -313,13 +326,20 @@ def _limits(where: str, limits: Any) -> tuple[float, float]:
 
 
 def _gravity(name: str, gravity: Any) -> tuple[Expression, ...]:
+    """Return the three components of gravity as expressions; raise a DescriptionError otherwise.
+
+    `name` is the name of the robot.
+    """
     if not isinstance(gravity, (list, tuple, np.ndarray)) or len(gravity) != 3:
         raise DescriptionError(f"{name}: gravity {gravity!r} has not three values; give [x, y, z]")
     return tuple(expression(g, f"{name}, gravity") for g in gravity)
 
 
 def _values(name: str, given: Mapping[str, float], rows: Any) -> dict[str, float]:
-    """Return the values of the symbols: given values, and defaults of Parameters in the rows."""
+    """Return the values of the symbols: given values, and else defaults of Parameters in the rows.
+
+    `rows` are (frames, bodies, gravity). Raise a DescriptionError for a value of an unused symbol.
+    """
     used: dict[str, float | None] = {}
     for scalar in _scalars(rows):
         for symbol in parameters_of(scalar):
@@ -336,6 +356,10 @@ def _values(name: str, given: Mapping[str, float], rows: Any) -> dict[str, float
 
 
 def _guess(table: RobotTable) -> dict[str, float]:
+    """Return the guess of a table as numbers by joint.
+
+    Raise a DescriptionError for unknown joints.
+    """
     where = f"{table.name}, guess"
     known = [table.joint_name(j) for j in range(1, len(table.frames) + 1) if _has_joint(table, j)]
     values: dict[str, float] = {}
@@ -349,6 +373,7 @@ def _guess(table: RobotTable) -> dict[str, float]:
 
 
 def _scalars(rows: Any) -> Iterator[Expression]:
+    """Yield all scalar expressions of (frames, bodies, gravity)."""
     frames, bodies, gravity = rows
     for row in frames:
         yield from (getattr(row, key) for key in GEOMETRY)
@@ -359,6 +384,7 @@ def _scalars(rows: Any) -> Iterator[Expression]:
 
 
 def _check_bodies(table: RobotTable) -> None:
+    """Raise a DescriptionError if a body row has no frame of its own, or drives a fixed frame."""
     seen: set[int] = set()
     for body in table.bodies:
         where = f"{table.name}/body {body.frame}"
@@ -374,6 +400,7 @@ def _check_bodies(table: RobotTable) -> None:
 
 
 def _check_loops(table: RobotTable) -> None:
+    """Raise a DescriptionError if cuts share frames, or a cut frame has a body or descendants."""
     used: set[int] = set()
     for k, loop in enumerate(table.loops, 1):
         where = f"{table.name}/loop {k}"
@@ -400,15 +427,17 @@ def _check_loops(table: RobotTable) -> None:
 
 
 def _is_moving(table: RobotTable, frame: int) -> bool:
-    """Whether the frame moves with the variable of a cut joint."""
+    """Whether the frame with this number moves with the variable of a cut joint."""
     return any(loop.cut[0] == frame for loop in table.loops)
 
 
 def _has_joint(table: RobotTable, frame: int) -> bool:
+    """Whether the frame with this number has a joint: sigma is 0 or 1, or it is cut."""
     return table.frames[frame - 1].sigma != 2 or _is_moving(table, frame)
 
 
 def _check_loop(where: str, loop: CutRow, frames: tuple[FrameRow, ...]) -> None:
+    """Raise a DescriptionError if a cut has an unknown joint, wrong frames or a wrong sigma."""
     if loop.joint not in LOOP_JOINTS:
         raise DescriptionError(
             f"{where}: joint {loop.joint!r} is unknown;"
@@ -430,10 +459,12 @@ def _check_loop(where: str, loop: CutRow, frames: tuple[FrameRow, ...]) -> None:
 
 
 def _has_inertia(body: InertiaRow) -> bool:
+    """Whether an inertial parameter of a body row is nonzero or a symbol."""
     return any(to_float(getattr(body, name)) != 0 for name in TEN_PARAMETERS)
 
 
 def _is_int(value: object) -> bool:
+    """Whether a value is a Python or numpy integer; booleans are not."""
     return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
 
 
@@ -460,8 +491,12 @@ def to_mechanism(table: RobotTable) -> Mechanism:
     body fixed to its antecedent. The two frames of a cut become one joint between their links, at
     which the loop is cut. It is passive unless the row of its moving frame is actuated.
 
+    Args:
+        table: table of frames.
+
     Raises:
-        DescriptionError: a body is physically inconsistent, two names are equal, or the base moves.
+        DescriptionError: the argument is not a table, a body is physically inconsistent, two names
+            are equal, or the base moves.
     """
     require_table(table)
     _check_base(table)
@@ -501,6 +536,7 @@ def _close(
     links: dict[int, RigidBody],
     row: InertiaRow,
 ) -> None:
+    """Add the cut joint of a loop between two links; `row` is the body row with its drive."""
     moving, fixed = loop.cut
     scalars = _joint(table, moving, row, bool(table.frames[moving - 1].actuated))
     joint = _CLOSING[loop.joint](**scalars)
@@ -509,9 +545,10 @@ def _close(
 
 
 def _place(table: RobotTable, j: int, links: Mapping[int, RigidBody]) -> Point:
-    """Return the zero position of frame j, relative to an existing link.
+    """Return frame j at joint position zero, relative to an existing link.
 
-    The antecedent may be the fixed frame of a cut, which is itself fixed to a link.
+    The antecedent may be the fixed frame of a cut, which is itself fixed to a link. `links` are the
+    bodies by frame number.
     """
     rows = [table.frames[j - 1]]
     while rows[-1].antecedent not in links:
@@ -523,10 +560,12 @@ def _place(table: RobotTable, j: int, links: Mapping[int, RigidBody]) -> Point:
 
 
 def _actuated(table: RobotTable, frame: FrameRow) -> bool | None:
+    """Return whether a joint is actuated; None if the assembly decides, in robots with loops."""
     return True if frame.actuated is None and not table.loops else frame.actuated
 
 
 def _joint(table: RobotTable, j: int, row: InertiaRow, actuated: bool | None) -> dict[str, Any]:
+    """Return the arguments of the joint component of frame j: name, limits and drive."""
     return {
         "name": table.joint_name(j),
         "actuated": actuated,
@@ -536,11 +575,13 @@ def _joint(table: RobotTable, j: int, row: InertiaRow, actuated: bool | None) ->
 
 
 def _body(j: int, row: InertiaRow) -> KhalilBody:
+    """Return the body of frame j with the inertial parameters of its row."""
     ten: dict[str, Any] = {name: getattr(row, name) for name in TEN_PARAMETERS}
     return KhalilBody(row.name or f"link{j}", grouped=row.grouped, **ten)
 
 
 def _check_base(table: RobotTable) -> None:
+    """Raise a DescriptionError if the table contains a motion of the base."""
     for key in _BASE_MOTION:
         if any(to_float(expression(text)) != 0 for text in table.extras.get(key, ())):
             raise DescriptionError(

@@ -20,7 +20,11 @@ Rows = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class BarShape:
-    """Round bar with hemispherical ends from a to b [m] in the link frame. radius: in m."""
+    """Round bar with hemispherical ends from a to b [m] in the link frame.
+
+    Attributes:
+        radius: radius of the bar [m].
+    """
 
     role: str
     link: int
@@ -32,7 +36,12 @@ class BarShape:
 
 @dataclass(frozen=True, slots=True)
 class CylinderShape:
-    """Cylinder from a to b [m] in the link frame. bore: radius of its bore [m], 0 if solid."""
+    """Cylinder from a to b [m] in the link frame.
+
+    Attributes:
+        radius: outer radius [m].
+        bore: radius of its bore [m], 0 if solid.
+    """
 
     role: str
     link: int
@@ -45,7 +54,7 @@ class CylinderShape:
 
 @dataclass(frozen=True, slots=True)
 class BallShape:
-    """Sphere about a point [m] in the link frame."""
+    """Sphere with a radius [m] about the point `at` [m] in the link frame."""
 
     role: str
     link: int
@@ -67,9 +76,11 @@ class BoxShape:
 
 @dataclass(frozen=True, slots=True)
 class RingShape:
-    """Ring (torus) about an axis through a point in the link frame.
+    """Ring (torus) about a direction `axis` through the point `at` [m] in the link frame.
 
-    radius: radius of its centre line [m]. tube: radius of the tube [m].
+    Attributes:
+        radius: radius of its centre line [m].
+        tube: radius of the tube [m].
     """
 
     role: str
@@ -133,7 +144,11 @@ class AxisShape:
 
 @dataclass(frozen=True, slots=True)
 class LabelShape:
-    """Text next to a point [m] in the link frame. row: number of texts below it at this point."""
+    """Text next to the point `at` [m] in the link frame.
+
+    Attributes:
+        row: number of other texts below it at this point.
+    """
 
     role: str
     link: int
@@ -147,7 +162,9 @@ class LabelShape:
 class SpanShape:
     """Round bar of variable length between points on two links.
 
-    ends: points in the frames of the two links [m].
+    Attributes:
+        ends: end points in the frames of the two links [m].
+        radius: radius of the bar [m].
     """
 
     role: str
@@ -161,7 +178,10 @@ class SpanShape:
 class SpringShape:
     """Coil spring of variable length between points on two links.
 
-    ends: points in the frames of the two links [m]. length: length at which its wire is round [m].
+    Attributes:
+        ends: end points in the frames of the two links [m].
+        radius: radius of the coil [m].
+        length: length of the spring at which its wire is drawn with a round cross-section [m].
     """
 
     role: str
@@ -189,7 +209,11 @@ Primitive = (
 
 
 def link_colour(number: int) -> str:
-    """Return the colour name of a link. number: 0 for the base."""
+    """Return the colour name of a link in the palette.
+
+    Args:
+        number: number of the link, 0 for the base.
+    """
     return "base" if number == 0 else LINK_COLOURS[(number - 1) % len(LINK_COLOURS)]
 
 

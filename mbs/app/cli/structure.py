@@ -31,7 +31,11 @@ class StructureRow:
 
 
 def structure(mechanism: Mechanism) -> StructureRow:
-    """Count joints and loops of a mechanism: rigid bodies are nodes, moving joints are edges."""
+    """Count joints and loops of a mechanism: rigid bodies are nodes, moving joints are edges.
+
+    Args:
+        mechanism: mechanism before its assembly.
+    """
     home: dict[_Port, _Port] = {}
     for a, b in mechanism.connections:
         _join(home, (a.owner.name, a.port), (b.owner.name, b.port))
@@ -50,6 +54,7 @@ def structure(mechanism: Mechanism) -> StructureRow:
 
 
 def _kind(ends: list[tuple[_Port, _Port]], world: _Port, loops: int) -> str:
+    """Return "closed", "tree" or "serial" from the bodies (groups of ports) that joints connect."""
     if loops:
         return "closed"
     joints_at = Counter(node for pair in ends for node in pair)
@@ -58,12 +63,14 @@ def _kind(ends: list[tuple[_Port, _Port]], world: _Port, loops: int) -> str:
 
 
 def _root(home: dict[_Port, _Port], port: _Port) -> _Port:
+    """Return the port that represents the rigid group of a port, in a disjoint-set forest."""
     while port in home:
         port = home[port]
     return port
 
 
 def _join(home: dict[_Port, _Port], a: _Port, b: _Port) -> None:
+    """Merge the rigid groups of two ports in a disjoint-set forest."""
     a, b = _root(home, a), _root(home, b)
     if a != b:
         home[a] = b

@@ -66,7 +66,7 @@ class BaseTable:
     text: str
 
     def csv(self) -> str:
-        """Return comma-separated name, unit, expression and value, with a header."""
+        """Return the base parameters as comma-separated text: name, unit, expression and value."""
         stream = io.StringIO()
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(("name", "unit", "expression", "value"))
@@ -108,7 +108,10 @@ def base(
 
 
 def _values(found: BaseParameters) -> list[float | None]:
-    """Return the values of the base parameters with the values of the description."""
+    """Return the values of the base parameters from the description.
+
+    None if a symbol has no value.
+    """
     system = found.system
     p = [system.p] if system.parameters else []
     symbolic = found.function(symbolic_parameters(system, found.columns), *p)

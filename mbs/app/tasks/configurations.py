@@ -60,13 +60,14 @@ def pose_of(
 
 
 def pose_from(xyz: Sequence[Scalar], rpy: Sequence[Scalar]) -> Array:
-    """Return the pose (4, 4) with a position and rotations about the fixed axes x, then y, then z.
-
-    R = Rz(yaw) Ry(pitch) Rx(roll).
+    """Return the pose with a position and rotations about the fixed axes x, then y, then z.
 
     Args:
         xyz: (3,) position of the origin [m].
         rpy: (3,) roll, pitch and yaw [rad].
+
+    Returns:
+        Homogeneous matrix (4, 4) with R = Rz(yaw) Ry(pitch) Rx(roll).
 
     Raises:
         ModelError: the lengths are not three, or an element has no value.
@@ -79,12 +80,18 @@ def pose_from(xyz: Sequence[Scalar], rpy: Sequence[Scalar]) -> Array:
     T = np.eye(4)
     T[:3, 3] = [number(value, "pose") for value in xyz]
     roll, pitch, yaw = (number(value, "pose") for value in rpy)
-    T[:3, :3] = _turn(2, yaw) @ _turn(1, pitch) @ _turn(0, roll)
+    T[:3, :3] = _axis_rotation(2, yaw) @ _axis_rotation(1, pitch) @ _axis_rotation(0, roll)
     return T
 
 
 def rpy_of(T: Array) -> tuple[float, float, float]:
-    """Return roll, pitch and yaw [rad] of a pose (4, 4); roll is 0 if the x axis is vertical."""
+    """Return roll, pitch and yaw [rad] of a pose, with R = Rz(yaw) Ry(pitch) Rx(roll).
+
+    Roll is 0 if the x axis is vertical, where only a combination of roll and yaw is determined.
+
+    Args:
+        T: (4, 4) homogeneous matrix.
+    """
     R = np.asarray(T, dtype=float)[:3, :3]
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
@@ -116,7 +123,8 @@ def pose_from_text(text: str) -> Array:
     return T
 
 
-def _turn(axis: int, angle: float) -> Array:
+def _axis_rotation(axis: int, angle: float) -> Array:
+    """Return the rotation matrix (3, 3) by an angle [rad] about coordinate axis 0, 1 or 2."""
     k, h = (axis + 1) % 3, (axis + 2) % 3
     R = np.eye(3)
     R[k, k] = R[h, h] = math.cos(angle)
@@ -221,7 +229,16 @@ class ConfigurationList:
 def locked_by_default(
     system: System, frame: str | int | None = None, seed: Seed = None
 ) -> dict[str, float]:
-    """Return the positions of the joints that are locked by default; empty up to six joints."""
+    """Return the positions of the joints that are locked by default; empty up to six joints.
+
+    Args:
+        system: the mechanism.
+        frame: body, named frame or number of a link; None for the terminal frame.
+        seed: configuration that gives the positions; None for the assembled configuration.
+
+    Returns:
+        Position by joint name [rad or m].
+    """
     name = terminal_frame(system) if frame is None else frame
     return held_at(system, surplus_joints(system, name), system.position(seed))
 
@@ -293,11 +310,13 @@ def configurations(
 
 
 def _method(system: System, frame: str | int, method: str, held: Mapping[str, float]) -> str:
+    """Return the method to use: the search instead of "general" if not six joints are free."""
     free = [joint for joint in moving_joints(system, frame) if joint not in held]
     return "search" if method == "general" and free and len(free) != SIX else method
 
 
 def _row(one: Solution, limits: CoordinateLimits) -> Configuration:
+    """Return a solution of the inverse geometric model as a row."""
     return Configuration(
         q=_tuple(one.q),
         label=one.branch,
@@ -314,7 +333,10 @@ def _row(one: Solution, limits: CoordinateLimits) -> Configuration:
 def _near(
     system: System, found: Solutions, wanted: Any, seed: Seed, parameters: Values
 ) -> Near | None:
-    """Return the nearest reachable pose; for loops, a local minimum found from the seed."""
+    """Return the nearest reachable pose; for loops, a local minimum found from the seed.
+
+    None if no such pose was found. `wanted` is (frame, target pose).
+    """
     near = found.nearest
     if near is not None and np.all(np.isfinite(near.q)):
         return Near(_tuple(near.q), float(near.distance), float(near.angle), _rows_of(near.T))
@@ -331,8 +353,10 @@ def _near(
 
 
 def _rows_of(T: Array) -> tuple[tuple[float, ...], ...]:
+    """Return a matrix as tuples of rows."""
     return tuple(tuple(float(x) for x in row) for row in T)
 
 
 def _tuple(q: Array) -> tuple[float, ...]:
+    """Return a vector as a tuple of floats."""
     return tuple(float(x) for x in q)

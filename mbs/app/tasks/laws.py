@@ -53,6 +53,11 @@ def number(value: float | str, where: str, known: Mapping[str, float] | None = N
 def numbers(values: Laws, where: str, known: Mapping[str, float]) -> dict[str, float]:
     """Convert the values of a mapping to numbers by `number`.
 
+    Args:
+        values: numbers or texts, by name.
+        where: system and quantity, for error messages.
+        known: values of the symbols that texts may contain.
+
     Raises:
         ExpressionError: a value is not a number.
     """
@@ -85,8 +90,8 @@ def law_of_motion(
 ) -> Callable[[SX, SX, SX], SX]:
     """Return a vector of values as a function of (t, q, v); values without a law are zero.
 
-    A law may contain t, the positions and velocities of the system, such as `j1.q` and `j1.v`,
-    and the symbols of the system, which are replaced by numbers.
+    A law may contain t, the positions and velocities of the system, such as `j1.q` and `j1.v`, and
+    the symbols of the system, which are replaced by numbers.
 
     Args:
         system: open or closed system.
@@ -94,6 +99,9 @@ def law_of_motion(
         names: names of all values, in the order of the vector.
         known: values of the symbols of the system.
         what: description of the laws, for error messages.
+
+    Returns:
+        Callable (t (1, 1), q (nq, 1), v (nv, 1)) -> values (len(names), 1).
 
     Raises:
         ExpressionError: a law cannot be read, or contains an unknown symbol.
@@ -137,7 +145,10 @@ def law_of_time(
 def _law(
     law: float | str, where: str, signals: Sequence[str], known: Mapping[str, float]
 ) -> Expression:
-    """Read a law, with numbers instead of the symbols of the system."""
+    """Return a law as an expression of `signals`, with numbers for the symbols of the system.
+
+    Raise an ExpressionError or ModelError that begins with `where` if it is invalid.
+    """
     values = {name: value for name, value in known.items() if name not in signals}
     read = _read(law, where)
     _require_known(read, [*signals, *values], where)
@@ -152,6 +163,7 @@ def _law(
 
 
 def _read(value: float | str, where: str) -> Expression:
+    """Return a text or number as an expression; raise an ExpressionError if it is invalid."""
     if isinstance(value, str) and len(value) > _LONGEST:
         raise ExpressionError(
             f"{where}: the text has {len(value)} characters; write at most {_LONGEST}"
@@ -160,6 +172,7 @@ def _read(value: float | str, where: str) -> Expression:
 
 
 def _require_known(read: Expression, known: Iterable[str], where: str) -> None:
+    """Raise a ModelError if an expression contains a symbol that is not in `known`."""
     names = list(known)
     for parameter in parameters_of(read):
         if parameter.name not in names:

@@ -43,7 +43,7 @@ class SweepTable:
     failures: Mapping[int, str]
 
     def csv(self) -> str:
-        """Return comma-separated values with a header; empty fields for failed cases."""
+        """Return the table as comma-separated text with a header; empty fields for failed cases."""
         stream = io.StringIO()
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(self.columns)
@@ -105,6 +105,10 @@ def sweep(
 
 
 def _values(text: str, name: str) -> list[float]:
+    """Return the values of a text "FROM:TO:STEP" or "a, b, c".
+
+    Raise a ModelError if it is neither.
+    """
     parts = text.split(":")
     if len(parts) == 1:
         return [number(part.strip(), f"grid of {name}") for part in text.split(",")]
@@ -126,12 +130,13 @@ def _values(text: str, name: str) -> list[float]:
 
 
 def _signal_units(study: Sweep) -> dict[str, str]:
+    """Return the units of the signals of a sweep, by name; empty if all cases failed."""
     first: Result | None = next((result for _, result in study), None)
     return {} if first is None else dict(first.units)
 
 
 def _units(system: System) -> dict[str, str]:
-    """Return the units of all quantities that can be varied."""
+    """Return the units of all quantities that can be varied, by name."""
     positions = ((f"{c.name}.q", c.unit) for c in system.coordinates)
     rates = ((f"{s.name}.v", s.unit) for s in system.speeds)
     efforts = ((f"{s.name}.tau", EFFORT_UNIT[s.unit]) for s in system.speeds)

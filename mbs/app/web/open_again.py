@@ -33,7 +33,9 @@ _OPENERS: Mapping[str, Opener] = {
 
 
 async def open_again(app: App) -> None:
-    """Reopen the tabs of the session, the last visible tab last, and record changes of tabs.
+    """Reopen the tabs that were open before a reload, and record later changes of tabs.
+
+    The tab that was visible is opened last.
 
     Args:
         app: app of the page, with its robot assembled.
@@ -51,9 +53,11 @@ async def open_again(app: App) -> None:
 
 
 async def _finish(opening: Any) -> None:
+    """Await an opening if it is a coroutine."""
     if opening is not None:
         await opening
 
 
 def _note(app: App, names: tuple[str, ...]) -> None:
+    """Record the keys of the open tabs in the session."""
     app.session.notes[_NOTE] = names

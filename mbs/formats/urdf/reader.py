@@ -68,11 +68,17 @@ class Reader:
     notes: Notes
 
     def fail(self, message: str) -> NoReturn:
-        """Raise a DescriptionError about the element."""
+        """Raise a DescriptionError with the file, the element and a message."""
         raise DescriptionError(f"{self.where}: {message}")
 
     def note(self, kind: NoteKind, text: str, element: Element | None = None) -> None:
-        """Add a note about the element, or about an element inside it."""
+        """Add a note about the element with its line number.
+
+        Args:
+            kind: kind of the note.
+            text: text of the note.
+            element: element inside it whose line number is given; by default the element itself.
+        """
         line = line_of(self.element if element is None else element)
         self.notes.add(kind, self.what, text, line)
 
@@ -84,13 +90,20 @@ class Reader:
     def number(
         self, element: Element | None, key: str, default: float, largest: float = _LARGEST
     ) -> float:
-        """Return one number of an element, or the default if it is missing."""
+        """Return the number in the attribute `key` of an element, or the default if it is missing.
+
+        Raise a DescriptionError if it is not a number or its magnitude exceeds `largest`.
+        """
         return self.vector(element, key, (default,), largest)[0]
 
     def vector(
         self, element: Element | None, key: str, default: Vector, largest: float = _LARGEST
     ) -> Vector:
-        """Return a vector attribute as long as the default, or the default if it is missing."""
+        """Return the numbers in the attribute `key` of an element, or the default if it is missing.
+
+        The default gives the required number of values. Raise a DescriptionError for another number
+        of values, or if a magnitude exceeds `largest`.
+        """
         text = None if element is None else element.get(key)
         if text is None:
             return default
@@ -107,6 +120,10 @@ class Reader:
             text: text in the file.
             count: required number of values.
             largest: largest allowed magnitude.
+
+        Raises:
+            DescriptionError: the text has another number of values, or a value is not a number or
+                too large.
         """
         if "${" in text or "$(" in text:
             self.fail(f"{key} is {quoted(text)}, which xacro has not expanded; {_EXPAND}")
@@ -147,7 +164,19 @@ class Inertial:
 
 
 def origin_of(reader: Reader, element: Element) -> tuple[Vector, list[tuple[str, float]]]:
-    """Return position [m] and rotations about z, y, x [rad] of the <origin> of an element."""
+    """Return the <origin> of an element: position and rotations relative to the parent frame.
+
+    Args:
+        reader: reader of the element or of an enclosing element, for error messages.
+        element: element that contains <origin>.
+
+    Returns:
+        Position (x, y, z) [m], and the nonzero rotations as (axis name, angle [rad]) in the order
+        z, y, x; each rotation is about an axis of the rotated frame.
+
+    Raises:
+        DescriptionError: a number cannot be read.
+    """
     origin = element.find("origin")
     xyz = reader.vector(origin, "xyz", (0.0, 0.0, 0.0))
     roll, pitch, yaw = reader.vector(origin, "rpy", (0.0, 0.0, 0.0))
@@ -156,7 +185,12 @@ def origin_of(reader: Reader, element: Element) -> tuple[Vector, list[tuple[str,
 
 
 def read_inertial(reader: Reader) -> Inertial:
-    """Return the inertial of a link, zero if it has none or no mass.
+    """Return mass and inertia of a link, zero if it has no <inertial> or no mass.
+
+    Missing moments count as 0. A note reports incomplete data.
+
+    Args:
+        reader: reader of the link.
 
     Raises:
         DescriptionError: a number cannot be read.
@@ -175,13 +209,14 @@ def read_inertial(reader: Reader) -> Inertial:
     com, turns = origin_of(reader, inertial)
     tensor = np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]])
     for axis, angle in reversed(turns):
-        R = _turn(axis, angle)
+        R = _axis_rotation(axis, angle)
         tensor = np.einsum("ij,jk,lk->il", R, tensor, R)
     tensor = (tensor + tensor.T) / 2
     return Inertial(reader.number(mass, "value", 0.0), com, tensor.tolist())
 
 
-def _turn(axis: str, angle: float) -> Any:
+def _axis_rotation(axis: str, angle: float) -> Any:
+    """Return the rotation matrix (3, 3) about the axis "x", "y" or "z" by an angle [rad]."""
     k = "xyz".index(axis)
     c, s = math.cos(angle), math.sin(angle)
     R = np.eye(3)
@@ -204,7 +239,13 @@ _KINDS = (*_ONE_AXIS, "fixed", "floating", "planar")
 
 @dataclass(frozen=True, slots=True)
 class JointElement:
-    """Joint of a URDF file with the names of its parent and child links."""
+    """Joint of a URDF file.
+
+    Attributes:
+        name: name of the joint, completed or changed if it is missing or used twice.
+        parent, child: names of its parent and child link.
+        element: XML element.
+    """
 
     name: str
     parent: str
@@ -219,7 +260,14 @@ class JointElement:
 
 @dataclass(frozen=True, slots=True)
 class UrdfTree:
-    """Links by name, and joints in an order in which parents precede children."""
+    """Links and joints of a URDF file, which form a tree.
+
+    Attributes:
+        notes: notes of the file.
+        root: name of the root link.
+        links: XML elements of the links, by name.
+        joints: joints in an order in which parents precede children.
+    """
 
     notes: Notes
     root: str
@@ -237,6 +285,10 @@ class UrdfTree:
 
 def read_tree(root: Element, notes: Notes) -> UrdfTree:
     """Return the links and joints of a <robot>, after a check that they form a tree.
+
+    Args:
+        root: XML element <robot>.
+        notes: notes of the file.
 
     Raises:
         DescriptionError: a joint refers to an unknown link, two different links have the same name,
@@ -266,6 +318,10 @@ def read_tree(root: Element, notes: Notes) -> UrdfTree:
 
 
 def _links(root: Element, notes: Notes) -> dict[str, Element]:
+    """Return the <link> elements by name; repeated and unnamed links are left out with a note.
+
+    Raise a DescriptionError if there is no link, or two different links have the same name.
+    """
     links: dict[str, Element] = {}
     texts = _Texts()
     for element in root.findall("link"):
@@ -292,6 +348,7 @@ def _links(root: Element, notes: Notes) -> dict[str, Element]:
 
 
 def _joints(root: Element, notes: Notes) -> dict[str, Element]:
+    """Return the <joint> elements by name; missing and repeated names are changed with a note."""
     joints: dict[str, Element] = {}
     count: dict[str, int] = {}
     texts = _Texts()
@@ -324,7 +381,7 @@ def _joints(root: Element, notes: Notes) -> dict[str, Element]:
 
 
 class _Texts(dict[Element, str]):
-    """Cache of the XML texts of elements."""
+    """Cache of the XML texts of elements, by element."""
 
     def same(self, one: Element, other: Element) -> bool:
         """Whether two elements have the same content, apart from white space."""
@@ -333,12 +390,14 @@ class _Texts(dict[Element, str]):
         return self[one] == self._text(other)
 
     def _text(self, element: Element) -> str:
+        """Return the XML text of an element with single blanks as white space."""
         return " ".join(tostring(element, encoding="unicode").split())
 
 
 def _joint_element(
     notes: Notes, name: str, element: Element, links: Collection[str]
 ) -> JointElement:
+    """Return a joint with its links; raise a DescriptionError if a link does not exist."""
     ends = []
     for side in ("parent", "child"):
         end = element.find(side)
@@ -355,6 +414,10 @@ def _joint_element(
 def _order(
     path: str, root: str, links: Iterable[str], joints: Iterable[JointElement]
 ) -> tuple[JointElement, ...]:
+    """Return the joints, parents before children; raise a DescriptionError if there is a cycle.
+
+    `root` is the name of the root link, `path` the file for error messages.
+    """
     children: dict[str, list[JointElement]] = {name: [] for name in links}
     for joint in joints:
         children[joint.parent].append(joint)
@@ -416,16 +479,27 @@ class KeptNames:
 
 
 @dataclass(frozen=True, slots=True)
-class Named:
-    """Component names of links, moving joints and the free root joint, by name in the file."""
+class ElementNames:
+    """Component names of links, moving joints and the free root joint.
+
+    Attributes:
+        links: component name by name of the link in the file.
+        joints: component name by name of the joint in the file, without fixed joints.
+        free: name of the joint of a free base.
+    """
 
     links: Mapping[str, str]
     joints: Mapping[str, str]
     free: str
 
 
-def element_names(tree: UrdfTree, base: Base | None) -> Named:
-    """Return the names of the elements in the mechanism, with a note for each change."""
+def element_names(tree: UrdfTree, base: Base | None) -> ElementNames:
+    """Return the component names of links and joints, with a note for each changed name.
+
+    Args:
+        tree: links and joints of the file.
+        base: "free" if the root gets a free joint, otherwise None.
+    """
     moving = [joint for joint in tree.joints if joint.kind != "fixed"]
     wanted = {component_name(name) for name in (*tree.links, *(j.name for j in moving))}
     names = KeptNames({"world"}, wanted)
@@ -461,11 +535,15 @@ def element_names(tree: UrdfTree, base: Base | None) -> Named:
             else "a joint, another link or the world has this name"
         )
         of_link[link] = names.give(tree.link(link), link, "link", why)
-    return Named(of_link, of_joint, free)
+    return ElementNames(of_link, of_joint, free)
 
 
-def _floats(tree: UrdfTree) -> bool:
-    """Whether root and links fixed to it have no inertial, and a floating joint starts there."""
+def _has_floating_base(tree: UrdfTree) -> bool:
+    """Whether the file itself has a floating base.
+
+    This is so if the root and all links fixed to it have no inertial and a floating joint starts
+    there.
+    """
     held = {tree.root}
     for joint in tree.joints:
         if joint.parent in held and joint.kind == "fixed":
@@ -475,7 +553,7 @@ def _floats(tree: UrdfTree) -> bool:
 
 
 def _at_world(tree: UrdfTree) -> set[str]:
-    """Return the links whose frame coincides with the world frame, if the root is fixed to it."""
+    """Return the links whose frame coincides with the root frame by fixed joints without offset."""
     found = {tree.root}
     for joint in tree.joints:
         if joint.kind == "fixed" and joint.parent in found:
@@ -511,6 +589,9 @@ def read_urdf(
         packages: folders of the packages in a xacro file or in `package://` names.
         other_files: whether to read the mesh files; set to False for files from untrusted sources.
 
+    Returns:
+        The mechanism. Its `notes` list ignored, changed and completed elements.
+
     Raises:
         DescriptionError: the file is missing or malformed, or its links and joints do not form a
             tree. In strict mode, also for each note.
@@ -533,8 +614,8 @@ def read_urdf(
         notes.add("completed", "<robot>", f"it has no name; named {quoted(name)}", line_of(root))
     mechanism = Mechanism(name, source=f"URDF file {Path(path).name}")
     mechanism.notes = notes.taken
-    base = "free" if base == "free" and not _floats(tree) else None
-    building = _Building(mechanism, tree, element_names(tree, base), _rotors(root, tree))
+    base = "free" if base == "free" and not _has_floating_base(tree) else None
+    building = _UrdfBuilder(mechanism, tree, element_names(tree, base), _rotors(root, tree))
     building.build(base)
     folder = Path(path).resolve().parent if other_files else None
     meshes = MeshFiles(folder, dict(packages or {}))
@@ -603,7 +684,7 @@ _WITH_EFFECT = {"springStiffness", "springReference", "turnGravityOff", "kinemat
 
 
 def _note_unread(root: Element, notes: Notes) -> None:
-    """Add one note for each kind of element that is not read."""
+    """Add one note for each kind of element of a <robot> that is not read."""
     unread: dict[tuple[str, str], list[Element]] = {}
     for parent in (root, *root.findall("link"), *root.findall("joint")):
         for child in parent:
@@ -620,7 +701,7 @@ def _note_unread(root: Element, notes: Notes) -> None:
 
 
 def _note_effects(root: Element, notes: Notes) -> None:
-    """Add notes about unread elements that would change the motion, such as loops and springs."""
+    """Add notes about unread elements of a <robot> that would change the motion, such as loops."""
     for element in root:
         local = element.tag.rpartition(":")[2]
         if local in _LOOPS:
@@ -644,6 +725,7 @@ def _effects(gazebo: Element) -> Iterator[Element]:
 
 
 def _is_zero(text: str) -> bool:
+    """Whether a text is the number zero; False if it is not a number."""
     try:
         return float(text) == 0
     except ValueError:
@@ -655,6 +737,9 @@ def _rotors(root: Element, tree: UrdfTree) -> dict[str, float]:
 
     A rotor inertia J with reduction n is n^2 J at the joint. A reduction without rotor inertia has
     no effect, since the inputs of the models are joint efforts.
+
+    Returns:
+        Rotor inertia by joint name in the file.
     """
     found: dict[str, float] = {}
     # the format has no other element for the armature of free joints
@@ -676,7 +761,10 @@ def _rotors(root: Element, tree: UrdfTree) -> dict[str, float]:
 
 
 def _scalar_in(element: Element, tags: Collection[str]) -> float | None:
-    """Return the first number in elements with these names, with any prefix."""
+    """Return the first finite number in a descendant element with one of the names `tags`.
+
+    Prefixes of names are ignored. None if there is no such number.
+    """
     for inner in element.iter():
         if inner.tag.rpartition(":")[2] in tags:
             try:
@@ -692,7 +780,7 @@ def _scalar_in(element: Element, tags: Collection[str]) -> float | None:
 
 
 @dataclass(slots=True)
-class _Building:
+class _UrdfBuilder:
     """Builder of a mechanism from the links and joints of a tree.
 
     Attributes:
@@ -700,20 +788,24 @@ class _Building:
         tree: tree of the file.
         names: names of the elements in the mechanism.
         rotors: rotor inertia Ia by joint name in the file.
-        inertials: inertial of each link.
+        inertials: mass and inertia of each link.
         leaders: for each mimic joint, the joint that it follows.
-        points: frame of each link.
+        points: frame of each link in the mechanism.
     """
 
     mechanism: Mechanism
     tree: UrdfTree
-    names: Named
+    names: ElementNames
     rotors: Mapping[str, float]
     inertials: dict[str, Inertial] = field(default_factory=dict)
     leaders: dict[str, str] = field(default_factory=dict)
     points: dict[str, Point] = field(default_factory=dict)
 
     def build(self, base: Base | None) -> None:
+        """Add all bodies, joints and couplings to the mechanism; `base` is "free" or None (fixed).
+
+        Raise a DescriptionError if a number or joint type of the file is invalid.
+        """
         tree = self.tree
         for link in tree.links:
             self.inertials[link] = read_inertial(tree.link(link))
@@ -726,6 +818,10 @@ class _Building:
         self._add_mimics()
 
     def _root(self, base: Base | None) -> Point:
+        """Add the root link and connect it to the world; return its frame.
+
+        A fixed root that is named "world" or has no mass is the world itself.
+        """
         mechanism, link = self.mechanism, self.tree.root
         world, name = mechanism.world.frame, self.names.links[link]
         if base == "free":
@@ -741,10 +837,15 @@ class _Building:
         return world
 
     def _body(self, link: str) -> Body:
+        """Return the body of a link with its inertia."""
         inertial = self.tree.links[link].find("inertial")
         return body_of(self.tree.link(link), self.names.links[link], self.inertials[link], inertial)
 
     def _add(self, joint: JointElement, parent: Point) -> Point:
+        """Add a joint and its child link; return the frame of the child.
+
+        `parent` is the frame of the parent link. Raise a DescriptionError for an unknown type.
+        """
         body = self.mechanism.add(self._body(joint.child))
         reader = self.tree.joint(joint)
         xyz, turns = origin_of(reader, joint.element)
@@ -758,6 +859,7 @@ class _Building:
         return body.frame
 
     def _joint(self, reader: Reader, joint: JointElement) -> Joint:
+        """Return a moving joint as a component with axis, limits, friction and rotor inertia."""
         name, kind = self.names.joints[joint.name], joint.kind
         dynamics = joint.element.find("dynamics")
         Fv, Fs = (_friction(reader, dynamics, key) for key in ("damping", "friction"))
@@ -794,6 +896,7 @@ class _Building:
             tree.link(tree.root).note("doubted", "nothing of the free robot has inertia")
 
     def _add_mimics(self) -> None:
+        """Add the mimics as couplings: position = offset + multiplier times leading position."""
         taken = {*self.mechanism.components, *self.mechanism.frames}
         for joint in self.tree.joints:
             mimic = joint.element.find("mimic")
@@ -832,7 +935,7 @@ def body_of(reader: Reader, name: str, inertial: Inertial, element: Element | No
 
 
 def _leaders(tree: UrdfTree) -> dict[str, str]:
-    """Return the joint that each mimic joint follows, with notes about invalid mimics."""
+    """Return the name of the joint that each mimic joint follows; a note reports invalid mimics."""
     found: dict[str, str] = {}
     last: dict[str, str] = {}
     kinds = {joint.name: joint.kind for joint in tree.joints}
@@ -875,6 +978,7 @@ def _mimic_fault(
 
 
 def _friction(reader: Reader, dynamics: Element | None, key: str) -> float:
+    """Return a friction coefficient of <dynamics>; a negative value counts as 0, with a note."""
     value = reader.number(dynamics, key, 0.0)
     if value >= 0:
         return value
@@ -886,7 +990,10 @@ _INFINITE = {"inf": math.inf, "infinity": math.inf, "nan": math.nan}
 
 
 def _limit(reader: Reader, limit: Element | None, key: str) -> float:
-    """Return a number of a <limit>, which may be infinite or NaN."""
+    """Return the number in the attribute `key` of a <limit>, which may be infinite or NaN.
+
+    Zero if it is missing.
+    """
     text = ("" if limit is None else limit.get(key, "")).strip().lower()
     if text.lstrip("+-") in _INFINITE:
         return _INFINITE[text.lstrip("+-")] * (-1 if text.startswith("-") else 1)
@@ -895,6 +1002,10 @@ def _limit(reader: Reader, limit: Element | None, key: str) -> float:
 
 
 def _limits(reader: Reader) -> tuple[float, float] | None:
+    """Return the position limits (lower, upper); None if they are missing, infinite or invalid.
+
+    A note reports each of these cases except two infinite limits.
+    """
     limit = reader.element.find("limit")
     if limit is None:
         reader.note("completed", "it has no <limit>; taken as unlimited")
@@ -911,7 +1022,11 @@ def _limits(reader: Reader) -> tuple[float, float] | None:
 
 
 def _largest(reader: Reader, key: str) -> float | None:
-    """Return the velocity or effort limit, or None; files contain zero if it is unknown."""
+    """Return the limit of the magnitude of velocity or effort (`key`), None if it is unlimited.
+
+    Zero counts as unlimited, since files contain zero if the limit is unknown. A note reports
+    negative values and NaN.
+    """
     limit = reader.element.find("limit")
     value = _limit(reader, limit, key)
     if value < 0 or math.isnan(value):
@@ -929,7 +1044,13 @@ _PRIMITIVES = {"box": ("size",), "sphere": ("radius",)} | dict.fromkeys(
 
 
 def material_colours(root: Element) -> dict[str, Vector]:
-    """Return (red, green, blue, opacity) of materials by name, by the first definition."""
+    """Return the colours (red, green, blue, opacity) of materials, each between 0 and 1, by name.
+
+    The first definition of a name counts.
+
+    Args:
+        root: XML element <robot>.
+    """
     found: dict[str, Vector] = {}
     own = (m for tag in ("visual", "collision") for v in root.iter(tag) for m in v.iter("material"))
     for material in (*root.findall("material"), *own):
@@ -940,7 +1061,10 @@ def material_colours(root: Element) -> dict[str, Vector]:
 
 
 def _rgba(material: Element) -> Vector | None:
-    """Return the colour in a material element, or None."""
+    """Return the colour (red, green, blue, opacity) in a <material>.
+
+    None if it has no valid one.
+    """
     colour = material.find("color")
     text = "" if colour is None else colour.get("rgba", "")
     try:
@@ -964,8 +1088,8 @@ def add_shapes(
     Args:
         mechanism: mechanism that receives the shapes.
         tree: tree of the file.
-        points: frames of the links.
-        colours: colours of materials by name.
+        points: frames of the links, by name.
+        colours: colours of materials by name; see `material_colours`.
         meshes: search for the mesh files.
     """
     seen = any(element.find("visual") is not None for element in tree.links.values())

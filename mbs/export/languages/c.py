@@ -42,7 +42,7 @@ class C(Language):
         return printer_of(C99CodePrinter, self.title, repr, _FORMS, "pow({0}, {1})")
 
     def is_reserved(self, name: str) -> bool:
-        """Whether C, its library or C++ uses the name."""
+        """Whether C, its library or C++ reserves a name."""
         return parameter_names([name], ["k"]) != [name]
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
@@ -66,6 +66,7 @@ class C(Language):
         yield "}"
 
     def _stores(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
+        """Yield the assignments of all outputs."""
         for out in unit.outputs:
             yield ""
             if unit.has_zeros(out):
@@ -73,5 +74,11 @@ class C(Language):
             yield from (f"    {store};" for store in self.stores(unit, out, printer))
 
     def place(self, argument: Argument, row: int, column: int) -> str:
-        """Return the text of an element of an input or output. row, column: 0-based."""
+        """Return the text of an element of an input or output, stored column by column.
+
+        Args:
+            argument: input or output.
+            row: row of the element, 0-based.
+            column: column of the element, 0-based.
+        """
         return f"{argument.name}[{row + argument.rows * column}]"

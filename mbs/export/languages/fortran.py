@@ -87,6 +87,7 @@ class Fortran(Language):
         yield f"end subroutine {unit.name}"
 
     def _stores(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
+        """Yield the assignments of all outputs."""
         for out in unit.outputs:
             yield ""
             if unit.has_zeros(out):
@@ -96,15 +97,18 @@ class Fortran(Language):
 
 
 def _number(value: float) -> str:
+    """Return a constant in double precision."""
     text = repr(value)
     return text.replace("e", "d") if "e" in text else f"{text}d0"
 
 
 def _statement(text: str, indent: str = "  ") -> list[str]:
+    """Return a statement broken into lines with continuation marks."""
     return wrap(text, indent, _CONTINUED, _COLUMNS)
 
 
 def _title(name: str, arguments: str) -> list[str]:
+    """Return the subroutine statement as lines."""
     line = f"subroutine {name}({arguments})"
     if len(line) <= _COLUMNS:
         return [line]
@@ -112,6 +116,7 @@ def _title(name: str, arguments: str) -> list[str]:
 
 
 def _declare(argument: Argument) -> str:
+    """Return the declaration of an argument: its name with its shape."""
     if argument.scalar:
         return argument.name
     shape = f"{argument.rows}" if argument.is_vector else f"{argument.rows},{argument.columns}"
@@ -119,5 +124,6 @@ def _declare(argument: Argument) -> str:
 
 
 def _declarations(names: Sequence[str]) -> Iterator[str]:
+    """Yield the declarations of local variables."""
     for k in range(0, len(names), _NAMES_A_LINE):
         yield from _statement(f"double precision :: {', '.join(names[k : k + _NAMES_A_LINE])}")

@@ -74,6 +74,7 @@ class Julia(Language):
 
 
 def _output(unit: CodeUnit, out: Argument, printer: Any) -> Iterator[str]:
+    """Yield the lines that create an output."""
     grid = grid_texts(unit, out, printer, "0.0")
     if not out.size:
         yield f"    {out.name} = zeros({out.rows}, {out.columns})"

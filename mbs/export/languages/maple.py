@@ -84,6 +84,7 @@ class Maple(Language):
 
 
 def _output(unit: CodeUnit, out: Argument, printer: Any) -> Iterator[str]:
+    """Yield the lines that create an output."""
     grid = grid_texts(unit, out, printer, "0")
     if out.scalar:
         value = grid[0][0]

@@ -62,7 +62,7 @@ class Mathematica(Language):
         return printer_of(MCodePrinter, self.title, _number, _FORMS, "{0}^{1}")
 
     def legal(self, name: str) -> str:
-        """Return the name without _, which marks patterns: a_b becomes aB, A1_12 becomes A1x12."""
+        """Return a name without "_", which marks patterns: a_b becomes aB, A1_12 becomes A1x12."""
         parts = re.sub(r"(?<=\d)_(?=\d)", "x", super().legal(name)).split("_")
         return parts[0] + "".join(part[:1].upper() + part[1:] for part in parts[1:])
 
@@ -89,12 +89,14 @@ class Mathematica(Language):
 
 
 def _number(value: float) -> str:
+    """Return a constant with *^ before its exponent."""
     text = plain_number(value)
     mantissa, _, exponent = text.partition("e")
     return f"{mantissa}*^{int(exponent)}" if exponent else text
 
 
 def _output(unit: CodeUnit, out: Argument, printer: Any) -> str:
+    """Return the expression of an output."""
     grid = grid_texts(unit, out, printer, "0")
     if out.scalar:
         return grid[0][0]

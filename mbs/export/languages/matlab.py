@@ -74,6 +74,7 @@ class Matlab(Language):
         yield "end"
 
     def _stores(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
+        """Yield the assignments of all outputs."""
         for out in unit.outputs:
             yield ""
             if not out.scalar or unit.has_zeros(out):
@@ -82,4 +83,5 @@ class Matlab(Language):
 
 
 def _statement(text: str, indent: str = "  ") -> list[str]:
+    """Return a statement broken into lines with continuation marks."""
     return wrap(text, indent, _CONTINUED)

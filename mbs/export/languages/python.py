@@ -72,6 +72,7 @@ class Python(Language):
         yield from body
 
     def _body(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
+        """Yield the lines of the body of the function."""
         shapes = []
         for argument in unit.inputs:
             yield f"    {argument.name} = np.asarray({argument.name}, dtype=float)"
@@ -90,6 +91,7 @@ class Python(Language):
         yield f"    return {', '.join(argument.name for argument in unit.outputs)}"
 
     def _output(self, unit: CodeUnit, out: Any, printer: Any) -> Iterator[str]:
+        """Yield the lines that create an output."""
         if not out.scalar:
             sizes = f"{out.rows}" if out.is_vector else f"{out.rows}, {out.columns}"
             yield f"    {out.name} = np.zeros(({sizes}, *shape))"
@@ -99,6 +101,7 @@ class Python(Language):
 
 
 def _statement(name: str, value: str) -> list[str]:
+    """Return an assignment as lines, in parentheses if it is long."""
     lines = wrap(f"{name} = {value}", "    ")
     if len(lines) == 1:
         return lines

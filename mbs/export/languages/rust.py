@@ -56,7 +56,13 @@ class Rust(Language):
         return printer_of(RustCodePrinter, self.title, repr, _FORMS, "f64::powf({0}, {1})")
 
     def place(self, argument: Argument, row: int, column: int) -> str:
-        """Return the text of an element of an input or output. row, column: 0-based."""
+        """Return the text of an element of an input or output, stored column by column.
+
+        Args:
+            argument: input or output.
+            row: row of the element, 0-based.
+            column: column of the element, 0-based.
+        """
         return f"{argument.name}[{row + argument.rows * column}]"
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:

@@ -39,7 +39,9 @@ def first_values(options: type) -> FormValues:
 
 
 def form_texts(options: type, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the texts of options for `mbs.app.tasks.options.keywords`.
+    """Return the texts of options from the values of a form.
+
+    The texts are arguments of `mbs.app.tasks.options.keywords`.
 
     Args:
         options: dataclass of the options.
@@ -120,10 +122,12 @@ def flags_field(options: type, values: FormValues, look: FieldLook) -> None:
 
 
 def _text(values: FormValues, key: str, look: FieldLook) -> ui.input:
+    """Create a text field that writes into `values[key]`."""
     return text_field(look, values[key], partial(values.__setitem__, key))
 
 
 def _choice(values: FormValues, name: str, option: OptionInfo) -> ui.select:
+    """Create a field for the choice of an option."""
     labels = {
         one: f"{one}, {word}" if word else one.replace("_", " ")
         for one, word in option.choices.items()
@@ -134,6 +138,7 @@ def _choice(values: FormValues, name: str, option: OptionInfo) -> ui.select:
 
 
 def _several(values: FormValues, name: str, option: OptionInfo, offered: Sequence[str]) -> None:
+    """Create a field for an option that is a list of names."""
     values[name] = [one for one in values[name] if one in offered]
     labels = {one: one.replace("_", " ") for one in offered}
     look = FieldLook(title_of(name, option), "100%", name)

@@ -31,6 +31,7 @@ from mbs.text import in_c_comment, quoted
 
 
 def _words(text: str) -> list[str]:
+    """Return the words of a text, which blanks and line breaks separate."""
     return text.split()
 
 

@@ -495,7 +495,7 @@ class UrdfTables(_Tables):
     def body_of(self, j: int, link: Link) -> str:
         """Return the first body of link j with its origin on the joint axis.
 
-        Empty if there is none.
+        Empty without such a body.
 
         For a free joint, the frame of the body must be that of the link in the tree.
         """
@@ -575,7 +575,7 @@ class MjcfTables(_Tables):
         self.symbols = dict(zip(names, casadi.vertsplit(system.p), strict=True))
 
     def pose(self, pose: Pose) -> Pose:
-        """Return the pose itself."""
+        """Return the pose itself, which is the transform of this class."""
         return pose
 
     def inverse(self, T: Pose) -> Pose:

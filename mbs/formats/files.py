@@ -78,6 +78,10 @@ def decoded(content: bytes, encoding: str = "utf-8") -> str:
 
     Each invalid byte becomes the replacement character U+FFFD.
 
+    Args:
+        content: bytes of a text.
+        encoding: encoding of a text without byte-order mark.
+
     Raises:
         LookupError: `encoding` is unknown.
     """
@@ -92,5 +96,8 @@ def component_name(text: str) -> str:
 
     Invisible characters are removed, and the name is cut to `LONGEST_NAME` characters. The name is
     empty if nothing remains.
+
+    Args:
+        text: name in a file.
     """
     return seen(_NOT_IN_NAMES.sub("_", text.strip()))[:LONGEST_NAME]

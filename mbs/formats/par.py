@@ -150,7 +150,11 @@ class ParFile:
         )
 
     def where(self, key: str) -> str:
-        """Return file, line and key for error messages; the file alone if the key is missing."""
+        """Return file, line and key for error messages; the file alone if the key is missing.
+
+        Args:
+            key: key of the file, such as "theta".
+        """
         return f"{self.path}:{self.entries[key][0]}: {key}" if key in self.entries else self.path
 
     def vector(self, key: str, length: int, per: str) -> tuple[str, ...] | None:
@@ -174,14 +178,22 @@ class ParFile:
         return values
 
     def integer(self, key: str, text: str) -> int:
-        """Convert the text of a value to an integer; raise a DescriptionError if it is none.
+        """Return the text of a value as an integer.
 
-        `key` is the key of the value, for the error message.
+        Args:
+            key: key of the value, for the error message.
+            text: text of the value.
+
+        Raises:
+            DescriptionError: the text is not an integer.
         """
         return whole_number(text, self.where(key))
 
     def count(self, key: str) -> int:
-        """Return the number of links, joints or frames: the value of the key NL, NJ or NF.
+        """Return the number of links, joints or frames.
+
+        Args:
+            key: NL (links), NJ (joints) or NF (frames).
 
         Raises:
             DescriptionError: the key is missing, or its value is not an integer from 1 to 1000.
@@ -195,13 +207,20 @@ class ParFile:
         return count
 
     def remarked(self, kind: str) -> Iterator[tuple[str, str, str]]:
-        """Yield (location for error messages, name, text) of every data comment of a kind."""
+        """Yield (location for error messages, name, text) of every data comment of a kind.
+
+        Args:
+            kind: "Value", "Guess", "Fs_width", "rest" or "grouped".
+        """
         for (found, name), (line, text) in self.remarks.items():
             if found == kind:
                 yield f"{self.path}:{line}: {kind} {name}", name, text
 
     def numbers(self, kind: str) -> dict[str, float]:
         """Return the values of all data comments of a kind as numbers, by name.
+
+        Args:
+            kind: "Value" or "Guess".
 
         Raises:
             DescriptionError: a value is not a number.

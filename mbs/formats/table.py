@@ -199,6 +199,7 @@ class RobotTable:
     extras: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        """Check the rows and convert their values to expressions and numbers."""
         if not isinstance(self.name, str) or not self.name.strip():
             raise DescriptionError(f"robot {self.name!r}: the name is not a text; give it a name")
         if not self.frames:
@@ -232,7 +233,11 @@ class RobotTable:
         return frozenset(symbol.name for scalar in scalars for symbol in parameters_of(scalar))
 
     def joint_name(self, j: int) -> str:
-        """Return the name of the joint of frame j (from 1): the name in its row, or q<j>."""
+        """Return the name of a joint: the name in its row, or q<j>.
+
+        Args:
+            j: number of the frame that the joint moves, from 1.
+        """
         return self.frames[j - 1].name or f"q{j}"
 
 

@@ -37,9 +37,10 @@ class XmlElement(Element):
 
 
 def line_of(element: Element | None) -> int | None:
-    """Return the line number (from 1) at which an element begins.
+    """Return the line number (from 1) at which an element begins; None if it is unknown.
 
-    None if the element is None or was not read from a file.
+    Args:
+        element: XML element, or None.
     """
     return getattr(element, "line", None)
 

@@ -457,9 +457,15 @@ def _path(points: Array) -> tuple[Point, ...]:
 
 
 def hull(points: Array) -> Array:
-    """Return the convex hull of points (k, 2) as corners (m, 2), counterclockwise.
+    """Return the convex hull of points in a plane.
 
     Source: Andrew 1979, monotone chain algorithm.
+
+    Args:
+        points: points (k, 2).
+
+    Returns:
+        Corners (m, 2), counterclockwise.
     """
     rows = sorted({(round(float(x), 9), round(float(y), 9)) for x, y in points})
     lower, upper = _chain(rows), _chain(rows[::-1])

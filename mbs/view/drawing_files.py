@@ -171,10 +171,10 @@ def icon(drawing: Drawing) -> bytes:
 def png(pixels: np.ndarray[tuple[int, int, int], np.dtype[np.uint8]]) -> bytes:
     """Encode pixels as a PNG file.
 
+    Source: W3C 2003, sections 5 and 7.
+
     Args:
         pixels: red, green, blue and opacity (rows, columns, 4), from 0 to 255.
-
-    Source: W3C 2003, sections 5 and 7.
     """
     rows, columns = pixels.shape[:2]
     head = struct.pack(">IIBBBBB", columns, rows, 8, 6, 0, 0, 0)

@@ -155,6 +155,8 @@ def thin(points: Array, triangles: NDArray[np.int64], most: int = MOST_TRIANGLES
 
     A mesh that is small enough is returned unchanged.
 
+    Source: Rossignac & Borrel 1993, vertex clustering.
+
     Args:
         points: corners (n, 3) [m].
         triangles: indices (m, 3) of points.
@@ -162,8 +164,6 @@ def thin(points: Array, triangles: NDArray[np.int64], most: int = MOST_TRIANGLES
 
     Raises:
         ModelError: no grid reduces the mesh to this number of triangles.
-
-    Source: Rossignac & Borrel 1993, vertex clustering.
     """
     count = len(triangles)
     for cells in _cells(most):

@@ -46,7 +46,10 @@ class Camera:
     away: float
 
     def seen(self, points: Array) -> tuple[Array, Array]:
-        """Project points (..., 3) in the base frame [m] to the picture.
+        """Project points to the picture.
+
+        Args:
+            points: points (..., 3) in the base frame [m].
 
         Returns:
             Positions (..., 2) in the picture, whose height is 2, and depths (...) [m]: coordinate

@@ -45,17 +45,21 @@ class PosedLinks:
     up: Array
 
     def local(self, link: int, point: Array) -> Vector:
-        """Transform a point (3,) [m] from the base frame to the frame of a link (number.
+        """Return a point of the base frame in the frame of a link.
 
-        0 is the base).
+        Args:
+            link: number of the link, 0 for the base.
+            point: (3,) point in the base frame [m].
         """
         R, p = self.poses[link, :, :3], self.poses[link, :, 3]
         return three(R.T @ (point - p))
 
     def local_direction(self, link: int, direction: Array) -> Vector:
-        """Transform a direction (3,) from the base frame to the frame of a link (number.
+        """Return a direction of the base frame in the frame of a link.
 
-        0 is the base).
+        Args:
+            link: number of the link, 0 for the base.
+            direction: (3,) direction in the base frame.
         """
         return three(self.poses[link, :, :3].T @ direction)
 
@@ -122,6 +126,9 @@ def picture_symbols(system: System) -> frozenset[str]:
     """Return the names of the symbols on which poses of links, joints and frames depend.
 
     The result is cached in the system.
+
+    Args:
+        system: mechanism, open or closed.
     """
 
     def found() -> frozenset[str]:
@@ -191,7 +198,10 @@ def _pose_function(system: System) -> Function:
 def position_of(system: System, q: Values) -> list[float]:
     """Return positions (nq,) [rad or m] from a sequence, or from a dict by name.
 
-    Positions that a dict does not name, and None, mean the assembled configuration.
+    Args:
+        system: mechanism, open or closed.
+        q: positions (nq,), or a dict of some positions by name. Positions that are not named, and
+            None, mean the assembled configuration.
 
     Raises:
         ModelError: a name is unknown, or the number of positions is wrong.
@@ -373,6 +383,9 @@ def plane_normal(scene: PosedLinks) -> Array | None:
     """Return the common direction (3,) of all revolute axes in the base frame.
 
     None if the axes differ, or without revolute joints, or with a free or spherical joint.
+
+    Args:
+        scene: posed links.
     """
     axes = [
         scene.directions[axis.direction]

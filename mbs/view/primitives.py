@@ -54,7 +54,12 @@ class CylinderShape:
 
 @dataclass(frozen=True, slots=True)
 class BallShape:
-    """Sphere with a radius [m] about the point `at` [m] in the link frame."""
+    """Sphere about a point in the link frame.
+
+    Attributes:
+        at: centre [m].
+        radius: radius [m].
+    """
 
     role: str
     link: int
@@ -65,7 +70,12 @@ class BallShape:
 
 @dataclass(frozen=True, slots=True)
 class BoxShape:
-    """Cuboid with side lengths `size` [m], centred at a pose in the link frame."""
+    """Cuboid at a pose in the link frame.
+
+    Attributes:
+        pose: pose of its centre, the 12 numbers of the rows of [R p].
+        size: side lengths along the axes of the pose [m].
+    """
 
     role: str
     link: int
@@ -94,7 +104,12 @@ class RingShape:
 
 @dataclass(frozen=True, slots=True)
 class PlateShape:
-    """Thin convex polygon with corners `points` [m] in the link frame."""
+    """Thin convex polygon in the link frame.
+
+    Attributes:
+        points: corners [m].
+        opacity: opacity from 0 to 1.
+    """
 
     role: str
     link: int
@@ -122,7 +137,12 @@ class MeshShape:
 
 @dataclass(frozen=True, slots=True)
 class FrameShape:
-    """Three arrows of a length [m] along the axes of a pose in the link frame."""
+    """Three arrows along the axes of a frame in the link frame.
+
+    Attributes:
+        pose: pose of the frame, the 12 numbers of the rows of [R p].
+        length: length of the arrows [m].
+    """
 
     role: str
     link: int
@@ -133,7 +153,11 @@ class FrameShape:
 
 @dataclass(frozen=True, slots=True)
 class AxisShape:
-    """Dashed line from a to b [m] in the link frame."""
+    """Dashed line of an axis in the link frame.
+
+    Attributes:
+        a, b: ends of the line [m].
+    """
 
     role: str
     link: int

@@ -185,6 +185,7 @@ class _ProgressSender:
         self._last: tuple[str, float] = ("", -1.0)
 
     def __call__(self, label: str, part: float) -> None:
+        """Send a label and a completed fraction (0 to 1) if the change is visible."""
         if label != self._last[0] or part >= min(self._last[1] + _STEP, 1.0) > self._last[1]:
             self._last = (label, part)
             self._theirs.send(("progress", label, part))

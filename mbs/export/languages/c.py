@@ -38,7 +38,7 @@ class C(Language):
     squares_as_products = True
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in C."""
         return printer_of(C99CodePrinter, self.title, repr, _FORMS, "pow({0}, {1})")
 
     def is_reserved(self, name: str) -> bool:
@@ -46,7 +46,12 @@ class C(Language):
         return parameter_names([name], ["k"]) != [name]
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the C text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         yield "/*"
         yield from (f" * {line}".rstrip() for line in kept_inside(unit.header, in_c_comment))
         yield from (" */", "#include <math.h>", "")

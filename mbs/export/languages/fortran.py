@@ -59,12 +59,17 @@ class Fortran(Language):
     longest_name = 31
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in Fortran."""
         signs = {"Unequality": "/="}
         return printer_of(FCodePrinter, self.title, _number, _FORMS, "{0}**{1}", signs, _JOINS)
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the Fortran text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         yield from comment_lines(unit.header, "!")
         arguments = [*unit.inputs, *unit.outputs]
         names = ", ".join(argument.name for argument in arguments)

@@ -29,14 +29,23 @@ Elements = Sequence[tuple[str, str]]
 
 
 class MatrixElement(NamedTuple):
-    """Position of a matrix element, 0-based."""
+    """Position of a matrix element.
+
+    Attributes:
+        row, column: indices from 0.
+    """
 
     row: int
     column: int
 
 
 class Term(NamedTuple):
-    """Joint angle, with sign +1 or -1, in a sum of joint angles."""
+    """Joint angle in a sum of joint angles.
+
+    Attributes:
+        sign: +1 or -1.
+        label: label of the joint, such as "2" for q2; "off" for a constant.
+    """
 
     sign: int
     label: str

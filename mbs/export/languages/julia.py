@@ -52,11 +52,16 @@ class Julia(Language):
     brackets = "[", "]"
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in Julia."""
         return printer_of(JuliaCodePrinter, self.title, repr, _FORMS, "{0}^{1}")
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the Julia text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         yield from comment_lines(unit.header, "#")
         arguments = ", ".join(argument.name for argument in unit.inputs)
         yield from wrap(f"function {unit.name}({arguments})")

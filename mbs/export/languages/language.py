@@ -79,7 +79,14 @@ class Store:
 
 @dataclass(frozen=True, slots=True)
 class CodeLine:
-    """Assignment name = value; with a condition, name = value if it holds, else `otherwise`."""
+    """Assignment of an expression, or of one of two expressions, to a name.
+
+    Attributes:
+        name: assigned name.
+        value: expression; with a condition, the expression if the condition holds.
+        condition: condition, or None.
+        otherwise: expression if the condition does not hold.
+    """
 
     name: str
     value: Expr
@@ -120,15 +127,27 @@ class CodeUnit:
         return [item.name for item in named if item.name not in arguments]
 
     def stores_of(self, argument: Argument) -> Sequence[Store]:
-        """Return the assignments of the nonzero elements of an output."""
+        """Return the assignments of the nonzero elements of an output.
+
+        Args:
+            argument: output.
+        """
         return [store for store in self.stores if store.argument is argument]
 
     def has_zeros(self, argument: Argument) -> bool:
-        """Whether an element of an output is structurally zero."""
+        """Whether an element of an output is structurally zero.
+
+        Args:
+            argument: output.
+        """
         return len(self.stores_of(argument)) < argument.size
 
     def grid(self, argument: Argument) -> list[list[Expr]]:
-        """Return the values of an output as a list of rows, with None for zeros."""
+        """Return the values of an output as a list of rows, with None for zeros.
+
+        Args:
+            argument: output.
+        """
         grid: list[list[Expr]] = [[None] * argument.columns for _ in range(argument.rows)]
         for store in self.stores_of(argument):
             grid[store.row][store.column] = store.value
@@ -336,7 +355,13 @@ def value_text(line: CodeLine, printer: Any, choice: str) -> str:
 
 
 def sections(unit: CodeUnit) -> Iterator[tuple[str, Sequence[CodeLine]]]:
-    """Yield pairs of comment and lines: lines that depend only on parameters, then all others."""
+    """Yield pairs of comment and lines: lines that depend only on parameters, then all others.
+
+    The comment is empty if no line depends only on parameters.
+
+    Args:
+        unit: function to write.
+    """
     if unit.fixed:
         yield "Parameters only: these may be computed once.", unit.fixed
         yield "The model.", unit.changing

@@ -56,9 +56,11 @@ class _Printer(LatexPrinter):  # type: ignore[misc]
         return form % tuple(self._print(arg) for arg in expr.args)
 
     def _print_Symbol(self, expr: Any, style: str = "plain") -> str:
+        """Return a symbol in LaTeX notation, such as a dotted q for QP2."""
         return symbol_text(expr.name)
 
     def _print_Float(self, expr: Any) -> str:
+        """Return a number with all digits, with a power of ten for its exponent."""
         mantissa, _, exponent = plain_number(float(expr)).partition("e")
         return rf"{mantissa} \cdot 10^{{{int(exponent)}}}" if exponent else mantissa
 
@@ -70,11 +72,16 @@ class Latex(Language):
     suffix = ".tex"
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in LaTeX."""
         return _Printer({"order": "none", "mul_symbol": r" \, ", "fold_short_frac": False})
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the LaTeX text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         yield from comment_lines(unit.header, "%")
         yield from (r"\documentclass{article}", r"\usepackage{amsmath}", r"\allowdisplaybreaks")
         yield r"\begin{document}"

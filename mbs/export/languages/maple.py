@@ -57,14 +57,19 @@ class Maple(Language):
     brackets = "[", "]"
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in Maple."""
         signs = {"Equality": "=", "Unequality": "<>"}
         return printer_of(
             MapleCodePrinter, self.title, plain_number, _FORMS, "{0}^{1}", signs, _JOINS
         )
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the Maple text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         yield from comment_lines(unit.header, "#")
         arguments = ", ".join(argument.name for argument in unit.inputs)
         yield from wrap(f"{unit.name} := proc({arguments})")

@@ -58,7 +58,7 @@ class Mathematica(Language):
     tail = "x"
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in Mathematica."""
         return printer_of(MCodePrinter, self.title, _number, _FORMS, "{0}^{1}")
 
     def legal(self, name: str) -> str:
@@ -67,7 +67,12 @@ class Mathematica(Language):
         return parts[0] + "".join(part[:1].upper() + part[1:] for part in parts[1:])
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the Mathematica text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         first, *others = kept_inside(unit.header, in_wolfram_comment)
         yield f"(* {first}"
         yield from (f"   {line}".rstrip() for line in others)

@@ -52,12 +52,17 @@ class Matlab(Language):
     longest_name = 63
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in Matlab."""
         signs = {"Unequality": "~="}
         return printer_of(OctaveCodePrinter, self.title, plain_number, _FORMS, "{0}^{1}", signs)
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the Matlab text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         inside = ", ".join(argument.name for argument in unit.inputs)
         outside = ", ".join(argument.name for argument in unit.outputs)
         outside = outside if len(unit.outputs) == 1 else f"[{outside}]"

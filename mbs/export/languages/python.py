@@ -51,13 +51,18 @@ class Python(Language):
     first = 0
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in Python."""
         return printer_of(
             PythonCodePrinter, self.title, plain_number, _FORMS, "{0}**{1}", joins=_JOINS
         )
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the Python text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         body = list(self._body(unit, printer))
         if any("math." in line for line in body):
             yield "import math"

@@ -52,7 +52,7 @@ class Rust(Language):
     squares_as_products = True
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in Rust."""
         return printer_of(RustCodePrinter, self.title, repr, _FORMS, "f64::powf({0}, {1})")
 
     def place(self, argument: Argument, row: int, column: int) -> str:
@@ -66,7 +66,12 @@ class Rust(Language):
         return f"{argument.name}[{row + argument.rows * column}]"
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the Rust text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         # Not `///`: cargo test compiles and runs examples in Rust documentation.
         yield from comment_lines(unit.header, "//")
         arguments = [f"{argument.name}: &[f64]" for argument in unit.inputs]

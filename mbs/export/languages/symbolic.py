@@ -330,6 +330,10 @@ class Readable(CodePrinter):  # type: ignore[misc]
         return self._print(expr)
 
     def _print(self, expr: Any, **kwargs: Any) -> str:
+        """Return the text of an expression, with the formats of the language.
+
+        Raise a ModelError if the language does not have a function.
+        """
         name = type(expr).__name__
         if name in self.comparisons:
             return self._comparison(expr)
@@ -345,21 +349,27 @@ class Readable(CodePrinter):  # type: ignore[misc]
         return _call_text(form, [self._print(arg) for arg in expr.args])
 
     def _print_Symbol(self, expr: Any) -> str:
+        """Return the name of a symbol."""
         return str(expr.name)
 
     def _print_Float(self, expr: Any, **kwargs: Any) -> str:
+        """Return a number with all digits."""
         return type(self).number(float(expr))
 
     def _print_One(self, expr: Any) -> str:
+        """Return the number one."""
         return type(self).number(1.0)
 
     def _print_Add(self, expr: Any, order: Any = None) -> str:
+        """Return a sum in the given order."""
         return str(CodePrinter._print_Add(self, expr, order="none"))
 
     def _print_Mul(self, expr: Any) -> str:
+        """Return a product in the given order."""
         return str(CodePrinter._print_Mul(self, expr))
 
     def _print_Pow(self, expr: Any, **kwargs: Any) -> str:
+        """Return a power, a square root or a reciprocal."""
         base, exponent = expr.args
         if exponent is S.Half:  # sqrt. Not for the number 0.5: only sqrt of -infinity is NaN
             return _call_text(self.forms["sqrt"], [self._print(base)])
@@ -375,6 +385,7 @@ class Readable(CodePrinter):  # type: ignore[misc]
         )
 
     def _comparison(self, expr: Any) -> str:
+        """Return a comparison with the sign of the language."""
         level = precedence(expr)
         left, right = (self.parenthesize(side, level) for side in expr.args)
         return f"{left} {self.comparisons[type(expr).__name__]} {right}"

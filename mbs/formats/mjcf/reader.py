@@ -139,6 +139,9 @@ class Flags:
 
         MuJoCo can disable groups 0 to 30; actuators of other groups always act, unless actuation as
         a whole is disabled.
+
+        Args:
+            group: number of the group.
         """
         return self.actuation and not (0 <= group < 31 and self.disabled_groups >> group & 1)
 
@@ -245,16 +248,29 @@ class MjcfModel:
         return self.notes.path
 
     def refuse(self, what: str, remedy: str = "take it out of the file") -> NoReturn:
-        """Raise a DescriptionError with the path of the file, the fault `what` and its remedy."""
+        """Raise a DescriptionError with the path of the file.
+
+        Args:
+            what: fault of the file.
+            remedy: what the user can do.
+        """
         raise DescriptionError(f"{self.path}: {what}; {remedy}")
 
     def has_one_axis(self, j: int) -> bool:
-        """Whether the joint with index j is a hinge or slide (one degree of freedom)."""
+        """Whether a joint is a hinge or slide, and so has one degree of freedom.
+
+        Args:
+            j: MuJoCo index of the joint.
+        """
         kinds = self.mujoco.mjtJoint
         return int(self.data.jnt_type[j]) in (int(kinds.mjJNT_HINGE), int(kinds.mjJNT_SLIDE))
 
     def drawn(self, j: int) -> float:
-        """Return the position of hinge or slide j in the initial configuration qpos0 [rad or m]."""
+        """Return the position of a hinge or slide in the initial configuration qpos0 [rad or m].
+
+        Args:
+            j: MuJoCo index of the joint.
+        """
         return float(self.data.qpos0[self.data.jnt_qposadr[j]])
 
     def terms(self, k: int) -> dict[int, float] | None:
@@ -276,7 +292,11 @@ class MjcfModel:
         return found
 
     def path_bodies(self, k: int) -> list[int]:
-        """Return the indices of the bodies along the path of spatial tendon k."""
+        """Return the MuJoCo indices of the bodies along the path of a spatial tendon.
+
+        Args:
+            k: MuJoCo index of the tendon.
+        """
         kinds = self.mujoco.mjtWrap
         first = int(self.data.tendon_adr[k])
         found = []
@@ -289,7 +309,11 @@ class MjcfModel:
         return found
 
     def joints_above(self, k: int) -> set[int]:
-        """Return the indices of the joints between the world and body k, without locked joints."""
+        """Return the indices of the joints between the world and a body, without locked joints.
+
+        Args:
+            k: MuJoCo index of the body.
+        """
         found: set[int] = set()
         while k:
             first = int(self.data.body_jntadr[k])
@@ -367,6 +391,9 @@ def drives(mjcf: MjcfModel) -> dict[int, dict[int, float | None]]:
     slider-crank drive all joints between the bodies on their path, with factors that depend on the
     configuration and are None here. Forces on sites and bodies drive no joint. Import notes report
     properties of actuators that are not read.
+
+    Args:
+        mjcf: compiled model.
 
     Returns:
         For each index of a driven joint: joint effort per unit of actuator force, by actuator
@@ -603,7 +630,13 @@ class Joints:
 
 
 def unused_name(mechanism: Mechanism, mjcf: MjcfModel, name: str) -> str:
-    """Return the name, with a number appended if the mechanism or the file already uses it."""
+    """Return the name, with a number appended if the mechanism or the file already uses it.
+
+    Args:
+        mechanism: mechanism under construction.
+        mjcf: compiled model.
+        name: desired component name.
+    """
     known = {*mjcf.bodies, *mjcf.joints, *mjcf.sites, *mjcf.equalities, *mjcf.tendons}
     return numbered_name(name, known, mechanism.components)
 

@@ -4,9 +4,11 @@ from collections.abc import Container
 
 
 def numbered_name(name: str, *taken: Container[str]) -> str:
-    """Return a name that none of the containers `taken` contains.
+    """Return a name that is not used yet; numbers from 2 are appended until it is unused.
 
-    If the name is taken, numbers from 2 are appended until it is not.
+    Args:
+        name: desired name.
+        *taken: containers of used names.
     """
     found, number = name, 2
     while any(found in names for names in taken):

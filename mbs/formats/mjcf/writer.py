@@ -68,7 +68,11 @@ def refusal(name: str, what: str, remedy: str) -> ModelError:
 
 
 def is_identity(T: Array) -> bool:
-    """Whether a transform (4, 4) is the identity, except for rounding (`SAME` [m or 1])."""
+    """Whether a transform is the identity, except for rounding (`SAME` [m or 1]).
+
+    Args:
+        T: homogeneous matrix (4, 4).
+    """
     return bool(np.max(np.abs(T[:3, 3])) < SAME and np.max(np.abs(T[:3, :3] - np.eye(3))) < SAME)
 
 

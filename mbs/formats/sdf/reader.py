@@ -72,29 +72,48 @@ written with six digits or more."""
 
 @dataclass(frozen=True, slots=True)
 class SdfReader(Reader):
-    """Reader of the numbers and words in child elements of one SDF element, with notes about it.
-
-    `parent` is in all methods the element that contains the child `tag`; None counts as empty.
-    """
+    """Reader of the numbers and words in child elements of one SDF element, with notes about it."""
 
     def values(self, parent: Element | None, tag: str, default: Vector) -> Vector:
-        """Return the numbers in the child element `tag`, or the default if it is missing or empty.
+        """Return the numbers in a child element, or the default if it is missing or empty.
 
-        The default gives the required number of values. Raise a DescriptionError for another
-        number.
+        Args:
+            parent: element that contains the child element; None counts as empty.
+            tag: name of the child element.
+            default: values by default, which give the required number of values.
+
+        Raises:
+            DescriptionError: the element has another number of values, or a value is not a number.
         """
         element = None if parent is None else parent.find(tag)
         text = "" if element is None else (element.text or "").strip()
         return self.numbers(element, tag, text, len(default)) if text else default
 
     def value(self, parent: Element | None, tag: str, default: float) -> float:
-        """Return the number in the child element `tag`, or the default if there is none."""
+        """Return the number in a child element, or the default if it is missing or empty.
+
+        Args:
+            parent: element that contains the child element; None counts as empty.
+            tag: name of the child element.
+            default: value by default.
+
+        Raises:
+            DescriptionError: the text is not a number.
+        """
         return self.values(parent, tag, (default,))[0]
 
     def limit(self, parent: Element | None, tag: str, default: float) -> float:
-        """Return a number that may be NaN or infinite, or the default if there is none.
+        """Return a number that may be NaN or infinite, or the default if it is missing or empty.
 
         Magnitudes from `UNLIMITED` (1e16) count as infinite.
+
+        Args:
+            parent: element that contains the child element; None counts as empty.
+            tag: name of the child element.
+            default: value by default.
+
+        Raises:
+            DescriptionError: the text is not a number.
         """
         element = None if parent is None else parent.find(tag)
         text = "" if element is None else (element.text or "").strip()
@@ -107,9 +126,15 @@ class SdfReader(Reader):
         return value if not abs(value) >= UNLIMITED else math.copysign(math.inf, value)
 
     def flag(self, parent: Element | None, tag: str, default: bool = False) -> bool:
-        """Return the truth value of the child element `tag`, or the default if there is none.
+        """Return the truth value of a child element, or the default if it is missing or empty.
 
-        Raise a DescriptionError if its text is not true, false, 1 or 0.
+        Args:
+            parent: element that contains the child element; None counts as empty.
+            tag: name of the child element.
+            default: value by default.
+
+        Raises:
+            DescriptionError: the text is not true, false, 1 or 0.
         """
         word = self.word(parent, tag).lower()
         if word in ("true", "1"):
@@ -121,7 +146,12 @@ class SdfReader(Reader):
         return default
 
     def word(self, parent: Element | None, tag: str) -> str:
-        """Return the text of the child element `tag`, empty if there is none."""
+        """Return the text of a child element; empty if there is none.
+
+        Args:
+            parent: element that contains the child element; None counts as empty.
+            tag: name of the child element.
+        """
         element = None if parent is None else parent.find(tag)
         return "" if element is None else (element.text or "").strip()
 
@@ -130,6 +160,12 @@ class SdfReader(Reader):
 
         The name of the reference frame is "" if it is not given. Without a <pose>, the matrix is
         the identity.
+
+        Args:
+            element: element that contains <pose>.
+
+        Raises:
+            DescriptionError: the format of the rotation is unknown, or a number cannot be read.
         """
         pose = element.find("pose")
         if pose is None:

@@ -90,19 +90,33 @@ class Reader:
     def number(
         self, element: Element | None, key: str, default: float, largest: float = _LARGEST
     ) -> float:
-        """Return the number in the attribute `key` of an element, or the default if it is missing.
+        """Return the number in an attribute of an element, or the default if it is missing.
 
-        Raise a DescriptionError if it is not a number or its magnitude exceeds `largest`.
+        Args:
+            element: XML element; None counts as an element without attributes.
+            key: name of the attribute.
+            default: value by default.
+            largest: largest allowed magnitude.
+
+        Raises:
+            DescriptionError: the text is not a number, or the number is too large.
         """
         return self.vector(element, key, (default,), largest)[0]
 
     def vector(
         self, element: Element | None, key: str, default: Vector, largest: float = _LARGEST
     ) -> Vector:
-        """Return the numbers in the attribute `key` of an element, or the default if it is missing.
+        """Return the numbers in an attribute of an element, or the default if it is missing.
 
-        The default gives the required number of values. Raise a DescriptionError for another number
-        of values, or if a magnitude exceeds `largest`.
+        Args:
+            element: XML element; None counts as an element without attributes.
+            key: name of the attribute.
+            default: values by default, which give the required number of values.
+            largest: largest allowed magnitude.
+
+        Raises:
+            DescriptionError: the attribute has another number of values, or a value is not a number
+                or too large.
         """
         text = None if element is None else element.get(key)
         if text is None:
@@ -151,7 +165,13 @@ _EXPAND = "load the .xacro file itself, or expand it first"
 
 @dataclass(frozen=True, slots=True)
 class Inertial:
-    """Mass [kg], centre of mass [m] and inertia (3, 3) about it [kg m^2], in the link frame."""
+    """Mass and inertia of a link, expressed in the link frame.
+
+    Attributes:
+        mass: mass [kg].
+        com: centre of mass [m].
+        tensor: inertia (3, 3) about the centre of mass [kg m^2].
+    """
 
     mass: float = 0.0
     com: Vector = (0.0, 0.0, 0.0)
@@ -275,7 +295,11 @@ class UrdfTree:
     joints: tuple[JointElement, ...]
 
     def link(self, name: str) -> Reader:
-        """Return a reader of the numbers of a link."""
+        """Return a reader of the numbers of a link.
+
+        Args:
+            name: name of the link in the file.
+        """
         return Reader(f"link {quoted(name)}", self.links[name], self.notes)
 
     def joint(self, joint: JointElement) -> Reader:

@@ -567,7 +567,7 @@ def _all_finite(arrays: Iterable[tuple[str, int]], real: Real) -> str:
 
 
 def _header(entries: Sequence[_Entry], steps: Mapping[str, StepTexts], library: _Library) -> str:
-    """Return the text of NAME.h."""
+    """Return the text of NAME.h with the prototypes of functions and simulations (`steps`)."""
     guard = f"MBS_{library.name.upper()}_H"
     texts = [STATUS]
     if library.bare:
@@ -630,7 +630,7 @@ def _elements(model: Function, name: str) -> str:
 
 
 def _example(entries: Sequence[_Entry], steps: Mapping[str, StepTexts], library: _Library) -> str:
-    """Return the text of example.c."""
+    """Return the text of example.c, which calls all functions and simulations (`steps`)."""
     head = (
         f"/* {_MARK}. */\n#include <stdio.h>\n"
         f'#include "{library.name}.h"\n\nint main(void) {{\n  int failed = 0;\n'

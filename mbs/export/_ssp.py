@@ -153,7 +153,7 @@ def _tag(name: str) -> str:
 
 
 def _component(parent: Element, part: SspPart) -> None:
-    """Append a component with its connectors and start values."""
+    """Append a component with its connectors and start values to the XML element `parent`."""
     element = SubElement(
         parent,
         _tag("ssd:Component"),
@@ -188,7 +188,7 @@ def _connector(parent: Element, variable: Any) -> None:
 
 
 def _bindings(parent: Element, part: SspPart) -> None:
-    """Append the start values of a component."""
+    """Append the start values of a component to its XML element `parent`."""
     bindings = SubElement(parent, _tag("ssd:ParameterBindings"))
     binding = SubElement(
         bindings, _tag("ssd:ParameterBinding"), type="application/x-ssp-parameter-set"
@@ -350,7 +350,10 @@ def _describe(part: str, file: Path) -> Any:
 
 
 def _sources(files: Mapping[str, Path], contents: Mapping[str, bytes]) -> dict[str, str]:
-    """Return the path of the FMU of each component in the archive; identical FMUs share a path."""
+    """Return the path in the archive of the FMU of each component; equal FMUs share a path.
+
+    `files` are the paths of the FMUs, `contents` their contents, by component.
+    """
     paths: dict[bytes, str] = {}
     for part, file in files.items():
         if contents[part] not in paths:
@@ -462,7 +465,10 @@ def _check_causality(address: str, variable: Any, expected: str, rule: str) -> N
 
 
 def _check_types(source: tuple[str, Any], target: tuple[str, Any]) -> None:
-    """Raise an ExportError if the types of two ends (address, variable) differ."""
+    """Raise an ExportError if the types of the two ends of a connection differ.
+
+    An end is (address, variable of the FMU).
+    """
     kinds = [ssp_kind(variable) for _, variable in (source, target)]
     if kinds[0] != kinds[1]:
         raise ExportError(
@@ -472,9 +478,10 @@ def _check_types(source: tuple[str, Any], target: tuple[str, Any]) -> None:
 
 
 def _check_units(source: tuple[str, Any, Any], target: tuple[str, Any, Any]) -> None:
-    """Raise an ExportError if the units of two ends differ.
+    """Raise an ExportError if the units of the two ends of a connection differ.
 
-    No unit and the unit "1" fit to every unit. An end is (address, variable, model description).
+    An end is (address, variable of the FMU, model description). No unit and the unit "1" fit to
+    every unit.
     """
     ends = [(unit_of(variable), description) for _, variable, description in (source, target)]
     (given, _), (expected, _) = ends
@@ -490,9 +497,9 @@ def _check_units(source: tuple[str, Any, Any], target: tuple[str, Any, Any]) -> 
 
 
 def _span(parts: Iterable[SspPart], stop_time: float | None) -> tuple[float, float]:
-    """Return default start and end of a simulation [s].
+    """Return default start and end of a simulation [s]: `stop_time`, or else the latest end.
 
-    Raise an ExportError if they are invalid.
+    Raise an ExportError if the end is not after the start.
     """
     experiments = [part.description.defaultExperiment for part in parts]
     begins = [float(getattr(e, "startTime", None) or 0.0) for e in experiments]

@@ -96,7 +96,10 @@ def check_of(model: Function, real: Real) -> StatusCheck | None:
 
 
 def _holds(rows: Sequence[ValidityRow], real: Real) -> SX:
-    """Return 1 or 0 for each condition (k, 1): whether it holds. A NaN residual violates it."""
+    """Return 1 or 0 for each condition (k, 1): whether it holds for numbers of the type `real`.
+
+    `rows` are the conditions. A NaN residual violates its condition.
+    """
     single = _SINGLE if real == "float" else {}
     values = [row.residual <= single.get(row.kind, row.bound) for row in rows]
     return casadi.vertcat(*values)

@@ -256,7 +256,10 @@ class _Variables:
 
 
 def _functions(system: System, state: MinimalState, variables: _Variables) -> list[Function]:
-    """Return the Functions that step.c, closure.c and watch.c call, with dense arguments."""
+    """Return the Functions that step.c, closure.c and watch.c call, with dense arguments.
+
+    `state` gives the equations of motion in independent coordinates.
+    """
     sizes = [len(own) for own in (variables.x, variables.z, variables.u, variables.p)]
     t, (x, z, u, p) = MX.sym("t"), (MX.sym("s", size) for size in sizes)
     point = [t, x, z, u, p]
@@ -281,7 +284,10 @@ def _functions(system: System, state: MinimalState, variables: _Variables) -> li
 
 
 def _sizes(system: System, state: MinimalState, variables: _Variables, work: int) -> dict[str, int]:
-    """Return the C constants of sizes by name; `work` is the scratch memory of the functions."""
+    """Return the C constants of sizes by name.
+
+    `work` is the number of elements of scratch memory that the functions need.
+    """
     nx, nz = len(variables.x), len(variables.z)
     return {
         "NX": nx,
@@ -312,7 +318,10 @@ def _quaternions(system: System, state: MinimalState) -> list[int]:
 def _header(
     system: System, variables: _Variables, sizes: dict[str, int], words: dict[str, str]
 ) -> str:
-    """Return the part of the library header that declares the simulation."""
+    """Return the part of the library header that declares the simulation.
+
+    `sizes` are the C constants, `words` the names that the text template contains.
+    """
     speeds = system.speeds
     texts = {
         "x": _words((v.name, v.unit) for v in variables.x),
@@ -353,7 +362,10 @@ def _words(elements: Iterable[tuple[str, str]]) -> str:
 
 
 def _head(sizes: dict[str, int], words: dict[str, str], real: Real) -> str:
-    """Return the head of the C file: includes, types and sizes."""
+    """Return the head of the C file: includes, types and sizes.
+
+    `sizes` are the C constants, `words` the names that the text template contains.
+    """
     watched = ""
     if sizes["NB"]:
         watched = f"#define WATCHED\ntypedef {words['name']}_watched watched;\n"
@@ -368,7 +380,7 @@ def _head(sizes: dict[str, int], words: dict[str, str], real: Real) -> str:
 
 
 def _tables(system: System, state: MinimalState, variables: _Variables, real: Real) -> list[str]:
-    """Return the C arrays of start values, bounds, scales and index tables."""
+    """Return the C arrays of start values, bounds, scales and index tables, as C definitions."""
     joints = (*variables.x, *variables.z)
     every = list(outputs(system, state))
     first = len(state.accelerations) + len(state.shown)
@@ -399,13 +411,13 @@ def _tables(system: System, state: MinimalState, variables: _Variables, real: Re
 
 
 def _numbers(name: str, values: Iterable[float], real: Real) -> str:
-    """Return the C definition of an array of numbers."""
+    """Return the C definition of a constant array `name` of numbers."""
     texts = [f"REAL({literal(float(value), real)})" for value in values] or ["REAL(0)"]
     return f"static const real {name}[] = {{{', '.join(texts)}}};"
 
 
 def _places(name: str, values: Sequence[int]) -> str:
-    """Return the C definition of an array of indices."""
+    """Return the C definition of a constant array `name` of indices."""
     return f"static const int {name}[] = {{{', '.join(map(str, values)) or '0'}}};"
 
 

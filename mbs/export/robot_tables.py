@@ -91,7 +91,7 @@ def robot_table(system: System, file: str = ".par") -> RobotTable:
         ModelError: the format does not support a motion, coupling or force element.
     """
     _check_frames(system, file)
-    text = _text_function(system)
+    text = text_function(system)
     size = max(map(_length, _shifts(system)), default=0.0) or 1.0
     frames: list[FrameRow] = []
     number = {-1: 0}  # link index to frame index in the file; the base is frame 0
@@ -121,7 +121,7 @@ def robot_table(system: System, file: str = ".par") -> RobotTable:
             rows.append(FrameRow(before, sigma, motor_of_cut, **_geometry(own, text)))
     first, count = len(frames) + 1, len(system.cuts)
     loops = [
-        CutRow((first + k, first + count + k), _joint_kind(cut))
+        CutRow((first + k, first + count + k), cut.edge.joint.freedoms[0].motion.value)
         for k, cut in enumerate(system.cuts)
     ]
     names = [f"q{number[j]}" for j in range(len(system.tree.links))]
@@ -196,11 +196,6 @@ def _geometry(placement: Khalil, text: Text) -> dict[str, Any]:
     return dict(zip(GEOMETRY, map(text, placement.parameters), strict=True))
 
 
-def _joint_kind(cut: Cut) -> str:
-    """Return the type of a cut joint: "revolute" or "prismatic"."""
-    return cut.edge.joint.freedoms[0].motion.value
-
-
 def _body(j: int, link: Link, text: Text) -> InertiaRow:
     """Return the body row of frame j; inertia that no body can have is marked as grouped."""
     ten = link.inertia.parameters
@@ -210,8 +205,14 @@ def _body(j: int, link: Link, text: Text) -> InertiaRow:
     return replace(row, grouped=False) if row.is_body else row
 
 
-def _text_function(system: System) -> Text:
-    """Return the function that writes a scalar expression of the symbols as text."""
+def text_function(system: System) -> Text:
+    """Return the function that writes a scalar expression of the symbols as text.
+
+    The text is in the grammar of mechanism files.
+
+    Args:
+        system: mechanism whose symbols the expressions contain.
+    """
     names = [parameter.name for parameter in system.parameters]
 
     def text(value: SX) -> str:
@@ -356,7 +357,7 @@ class _Tables:
         """
         raise NotImplementedError
 
-    def moved(self, j: int, link: Link) -> Any:
+    def displacement(self, j: int, link: Link) -> Any:
         """Return the transform of link j relative to its antecedent at the drawn positions.
 
         Both frames are those in the tree.
@@ -384,7 +385,7 @@ class _Tables:
             body=body,
             bodies=tuple(self._bodies(j)),
             frame=self.matrix(own),
-            placement=self.matrix(self.inverse(before) @ self.moved(j, link) @ own),
+            placement=self.matrix(self.inverse(before) @ self.displacement(j, link) @ own),
             joint_frame=self.matrix(self.inverse(own)),
             joint_pose=self.matrix(self.pose(link.pose())),
             inertia=number(link.inertia.parameters).ravel(),
@@ -410,7 +411,7 @@ class _Tables:
         return number, self.matrix(self.inverse(self.frames[number]) @ self.pose(pose))
 
     def _pair(self, one: Frame, other: Frame) -> tuple[Place, Place]:
-        """Return two frames as in `_place`."""
+        """Return the two coinciding frames of a loop as in `_place`."""
         return self._place(one), self._place(other)
 
     def _frame(self, name: str, place: Frame) -> FileFrame:
@@ -531,7 +532,7 @@ class SdfTables(_Tables):
         bodies = [name for name in self._bodies(j) if name in self.system.frames]
         return bodies[0] if bodies else ""
 
-    def moved(self, j: int, link: Link) -> Array:
+    def displacement(self, j: int, link: Link) -> Array:
         """Return the transform (4, 4) of link j relative to its antecedent, as drawn."""
         relative: Array = self.pose(link.pose()) @ self._motion(link)
         self.in_world[j] = self.in_world[link.antecedent] @ relative

@@ -390,9 +390,10 @@ def split_variable(where: str, value: Expression, j: int, sigma: int) -> tuple[s
 
 
 def _variable(where: str, value: Expression, j: int, sigma: int) -> str:
-    """Return the name of the joint variable of frame j in an expression, as in `split_variable`.
+    """Return the name of the joint variable of frame j in the expression `value`.
 
-    Raise a DescriptionError if no symbol, or more than one, is a candidate.
+    The rule is that of `split_variable`; sigma is 0 (revolute) or 1 (prismatic). Raise a
+    DescriptionError if no symbol, or more than one, is a candidate.
     """
     names = list(dict.fromkeys(p.name for p in parameters_of(value)))
     if len(names) == 1:
@@ -560,7 +561,10 @@ def _check_variables(file: ParFile, rows: tuple[FrameRow, ...], taken: Mapping[s
 def _bodies(
     file: ParFile, NL: int, NJ: int, frames: tuple[FrameRow, ...]
 ) -> tuple[InertiaRow, ...]:
-    """Return the body rows: inertia of links, and drive, spring and friction width of joints."""
+    """Return the body rows of a file with NL links and NJ joints.
+
+    They contain the inertia of links, and the drive, spring and friction width of joints.
+    """
     remarks = {kind: _remarks(file, kind, NJ) for kind in _OF_JOINTS}
     springs, grouped = _springs(file, NJ, frames), _remarks(file, "grouped", NJ)
     rows = []
@@ -576,7 +580,10 @@ def _bodies(
 
 
 def _springs(file: ParFile, NJ: int, frames: tuple[FrameRow, ...]) -> dict[int, Expression]:
-    """Return the spring stiffness of the joints that are flexible (eta = 1), by joint number."""
+    """Return the spring stiffness of the flexible joints (eta = 1) by joint number, from 1 to NJ.
+
+    Raise a DescriptionError if eta is invalid or a fixed frame is flexible.
+    """
     eta = file.vector(FLEXIBLE, NJ, "joint") or ()
     stiffness = file.vector(STIFFNESS, NJ, "joint")
     springs: dict[int, Expression] = {}
@@ -633,7 +640,10 @@ def _gravity(file: ParFile) -> tuple[Expression, ...]:
 
 
 def _extras(file: ParFile, NL: int, NJ: int) -> dict[str, tuple[str, ...]]:
-    """Return the vectors that are only kept for writing, as texts by key."""
+    """Return the vectors that are only kept for writing, as texts by key.
+
+    NL and NJ are the numbers of links and joints, which give the lengths of the vectors.
+    """
     lengths = {
         **dict.fromkeys(LINK_EXTRAS, NL),
         **dict.fromkeys(JOINT_EXTRAS, NJ),
@@ -795,7 +805,10 @@ def _extra_lines(table: RobotTable, keys: Iterable[str]) -> Iterator[str]:
 
 
 def _check_loops(table: RobotTable, NL: int, NJ: int) -> None:
-    """Raise a DescriptionError if a cut joint, or the frame numbers of a cut, are not possible."""
+    """Raise a DescriptionError if the format does not support a loop of the table.
+
+    It needs revolute or prismatic cut joints, and loop k cut between the frames NL + k and NJ + k.
+    """
     for k, loop in enumerate(table.loops, 1):
         if loop.joint not in ("revolute", "prismatic"):
             raise DescriptionError(

@@ -25,6 +25,16 @@ def inverse(T: Array) -> Array:
     return np.block([[R.T, -(R.T @ p)[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
 
 
+def axis_rotation(axis: int, angle: float) -> Array:
+    """Return the rotation matrix (3, 3) about coordinate axis 0, 1 or 2 by an angle [rad]."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    R = np.eye(3)
+    R[i, i] = R[j, j] = math.cos(angle)
+    R[j, i] = math.sin(angle)
+    R[i, j] = -R[j, i]
+    return R
+
+
 def matrix_of_angles(roll: float, pitch: float, yaw: float) -> Array:
     """Return the rotation matrix Rz(yaw) Ry(pitch) Rx(roll) (3, 3); angles in [rad]."""
     (a, b, c), (x, y, z) = map(math.cos, (roll, pitch, yaw)), map(math.sin, (roll, pitch, yaw))

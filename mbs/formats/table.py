@@ -274,13 +274,12 @@ def _bare(row: Row, names: tuple[str, ...]) -> Row:
     values: dict[str, Any] = {n: expression(str(getattr(row, n))) for n in names}
     if isinstance(row, InertiaRow):
         values["frame"] = int(row.frame) if _is_int(row.frame) else row.frame
-        values["rotor"] = row.rotor and replace(row.rotor, **_bare_scalars(row.rotor))
+        if row.rotor is not None:
+            scalars: dict[str, Any] = {
+                n: expression(str(getattr(row.rotor, n))) for n in ("inertia", "ratio")
+            }
+            values["rotor"] = replace(row.rotor, **scalars)
     return replace(row, **values)
-
-
-def _bare_scalars(rotor: Rotor) -> dict[str, Expression]:
-    """Return inertia and ratio of a rotor as expressions without default values, by name."""
-    return {name: expression(str(getattr(rotor, name))) for name in ("inertia", "ratio")}
 
 
 def _plain_cut(loop: CutRow) -> CutRow:
@@ -424,7 +423,8 @@ def _check_loops(table: RobotTable) -> None:
                 )
     for body in table.bodies:
         driven = body.drive and not _is_moving(table, body.frame)
-        if body.frame in table.cut_frames and (driven or _has_inertia(body)):
+        has_inertia = any(to_float(getattr(body, name)) != 0 for name in TEN_PARAMETERS)
+        if body.frame in table.cut_frames and (driven or has_inertia):
             raise DescriptionError(
                 f"{table.name}/body {body.frame}: the frame belongs to a cut joint, which has no"
                 " body; give the inertia to the link it is placed on"
@@ -461,11 +461,6 @@ def _check_loop(where: str, loop: CutRow, frames: tuple[FrameRow, ...]) -> None:
             f"{where}: frames {list(loop.cut)} of a {loop.joint} cut joint have sigma {moving} and"
             f" {fixed}; they must be {expected} and 2"
         )
-
-
-def _has_inertia(body: InertiaRow) -> bool:
-    """Whether an inertial parameter of a body row is nonzero or a symbol."""
-    return any(to_float(getattr(body, name)) != 0 for name in TEN_PARAMETERS)
 
 
 def _is_int(value: object) -> bool:
@@ -527,7 +522,8 @@ def to_mechanism(table: RobotTable) -> Mechanism:
         if frame.sigma == 2:
             mechanism.connect(point, links[j])
         else:
-            joint = _MOVING[frame.sigma](**_joint(table, j, row, _actuated(table, frame)))
+            actuated = True if frame.actuated is None and not table.loops else frame.actuated
+            joint = _MOVING[frame.sigma](**_joint(table, j, row, actuated))
             mechanism.connect(point, joint, links[j])
     for loop in table.loops:
         _close(mechanism, table, loop, links, rows.get(loop.cut[0], InertiaRow(loop.cut[0])))
@@ -564,13 +560,11 @@ def _place(table: RobotTable, j: int, links: Mapping[int, RigidBody]) -> Point:
     return point
 
 
-def _actuated(table: RobotTable, frame: FrameRow) -> bool | None:
-    """Return whether a joint is actuated; None if the assembly decides, in robots with loops."""
-    return True if frame.actuated is None and not table.loops else frame.actuated
-
-
 def _joint(table: RobotTable, j: int, row: InertiaRow, actuated: bool | None) -> dict[str, Any]:
-    """Return the arguments of the joint component of frame j: name, limits and drive."""
+    """Return the keyword arguments of the joint component of frame j.
+
+    They are its name, its limits, and the drive from the body row.
+    """
     return {
         "name": table.joint_name(j),
         "actuated": actuated,

@@ -61,6 +61,10 @@ def andrews_squeezer() -> Mechanism:
 
 
 def _lamina(name: str, mass: float, com: tuple[float, float], about_com: float) -> Body:
-    """Return a plane body: centre of mass (x, y) [m], moment about z at that point [kg m^2]."""
+    """Return a plane body.
+
+    `mass` in [kg], centre of mass `com` (x, y) in [m], moment of inertia `about_com` about the z
+    axis through it in [kg m^2].
+    """
     half = about_com / 2
     return Body(name, mass=mass, com=(*com, 0), inertia=(half, half, about_com))

@@ -36,6 +36,9 @@ def slider_crank() -> Mechanism:
 
 
 def _bar(name: str, mass: float, length: float, about_joint: float) -> Body:
-    """Return a homogeneous bar along x, given its moment of inertia about its end [kg m^2]."""
+    """Return a homogeneous bar from its reference frame along x.
+
+    `mass` in [kg], `length` in [m], moment of inertia `about_joint` about its end in [kg m^2].
+    """
     about_com = about_joint - mass * length**2 / 4
     return Body(name, mass=mass, com=(length / 2, 0, 0), inertia=(0, about_com, about_com))

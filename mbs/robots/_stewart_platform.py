@@ -70,7 +70,10 @@ def leg_ends() -> tuple[Points, Points]:
 
 
 def _circle(radius: float, angles: Points, height: float) -> Points:
-    """Return the points (k, 3) at given angles (k,) [rad] on a horizontal circle [m]."""
+    """Return points (k, 3) on a horizontal circle, with `radius` and `height` in [m].
+
+    Their positions on the circle are the `angles` (k,) [rad].
+    """
     heights = np.full(len(angles), height)
     return np.column_stack([radius * np.cos(angles), radius * np.sin(angles), heights])
 

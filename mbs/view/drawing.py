@@ -251,7 +251,7 @@ def _parts(item: Primitive, eye: _OrthographicView) -> tuple[list[Stroke], float
         line = Stroke(item.role, item.colour, _path(points), closed=True, width=tube)
         return [line], float(points[:, 2].mean())
     if isinstance(item, FrameShape):
-        return _tripod(item, eye)
+        return _frame_axes(item, eye)
     assert isinstance(item, AxisShape), f"{type(item).__name__} has no strokes"
     ends = list(eye.project(item.link, (item.a, item.b)))
     # thin line (drawing units); no line for an axis along the view direction
@@ -261,7 +261,10 @@ def _parts(item: Primitive, eye: _OrthographicView) -> tuple[list[Stroke], float
 
 
 def _area(item: Primitive, points: Array, opacity: float = 1.0, bright: float = 1.0) -> Stroke:
-    """Return a polygon (corners (k, 2)) in role and colour of a shape."""
+    """Return a polygon with corners `points` (k, 2 or 3), in role and colour of a primitive.
+
+    `bright` is its brightness relative to the colour.
+    """
     path = _path(points)
     return Stroke(item.role, item.colour, path, closed=True, opacity=opacity, bright=bright)
 
@@ -305,7 +308,7 @@ def _box(item: BoxShape, eye: _OrthographicView) -> tuple[list[Stroke], float]:
     return parts, float(corners[:, 2].mean())
 
 
-def _tripod(item: FrameShape, eye: _OrthographicView) -> tuple[list[Stroke], float]:
+def _frame_axes(item: FrameShape, eye: _OrthographicView) -> tuple[list[Stroke], float]:
     """Return the axes of a frame except an axis that points to the viewer, and its depth."""
     pose = np.array(item.pose).reshape(3, 4)
     ends = pose[:, 3] + item.length * pose[:, :3].T
@@ -320,7 +323,10 @@ def _tripod(item: FrameShape, eye: _OrthographicView) -> tuple[list[Stroke], flo
 
 
 def _coil(item: SpringShape, start: Array, end: Array, radius: float) -> Stroke:
-    """Return a spring as a zigzag, or as a line if its ends coincide in the drawing."""
+    """Return a spring between two projected points as a zigzag of half width `radius`.
+
+    It is a line if `start` and `end` (3,) coincide in the drawing. Lengths are in drawing units.
+    """
     start, along = start[:2], (end - start)[:2]
     length = float(np.linalg.norm(along))
     # length below 1e-9 drawing units is rounding; straight ends of 3/20 of the length and eight
@@ -444,7 +450,7 @@ def _room(text: str, point: Point, shift: Point) -> tuple[Point, _Room]:
 
 
 def _overlap(a: _Room, b: _Room) -> bool:
-    """Whether two rectangles (left, lower, right, upper) overlap."""
+    """Whether two rectangles a and b, each (left, lower, right, upper), overlap."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 

@@ -141,7 +141,9 @@ class Painter:
             matplotlib.LineCollection(segments, colors=tints, linewidths=0.6, zorder=0)
         )
         corners, colours, widths, shadow = self._faces(link_poses)
-        dark = self._mix(self._colour("background"), np.zeros(3), self._number("shadow"))
+        # the palette value is for the browser viewer; here shadows are lighter by 0.6
+        paper = self._colour("background")
+        dark = paper - 0.6 * self._number("shadow") * paper
         axes.add_collection(
             matplotlib.PolyCollection(
                 shadow, facecolors=[dark], edgecolors=[dark], linewidths=0.2, zorder=1
@@ -162,7 +164,7 @@ class Painter:
         shadow polygons (m, 4, 2). `link_poses` are poses (links + 1, 3, 4).
         """
         every = [
-            (self._transformed_corners(faces, link_poses[link]), faces)
+            (faces.corners @ link_poses[link, :, :3].T + link_poses[link, :, 3], faces)
             for link, faces in self.solid
         ]
         for item in self.scene.primitives:
@@ -178,10 +180,6 @@ class Painter:
         flat, depth = self.eye.seen(corners)
         order = np.argsort(depth.mean(axis=1), kind="stable")
         return flat[order], colours[order], widths[order], self._shadow(corners)
-
-    def _transformed_corners(self, faces: Faces, pose: Array) -> Array:
-        """Transform the corners of faces by a pose (3, 4) to the base frame."""
-        return np.array(faces.corners @ pose[:, :3].T + pose[:, 3])
 
     def _light(self, corners: Array, faces: Faces) -> tuple[Array, Array, Array]:
         """Return the visible faces with their shading.
@@ -261,11 +259,6 @@ class Painter:
         """Return a number of the palette, or 0 if the value is not a number."""
         value = PALETTE[self.theme][name]
         return float(value) if isinstance(value, (int, float)) else 0.0
-
-    def _mix(self, first: Array, second: Array, part: float) -> Array:
-        """Blend two colours (3,): 60 % of the fraction `part` of the second colour."""
-        # the palette value is for the browser viewer; here shadows are lighter by 0.6
-        return np.array(first + 0.6 * part * (second - first))
 
 
 def painter(

@@ -77,7 +77,8 @@ class Picture:
         """
         ending = path_of(path).suffix.lower()
         if ending not in _ENDINGS:
-            raise ExportError(f"{path_of(path)}: the ending is {ending!r}; use {_list()}")
+            endings = f"{', '.join(_ENDINGS[:-1])} or {_ENDINGS[-1]}"
+            raise ExportError(f"{path_of(path)}: the ending is {ending!r}; use {endings}")
         if ending == ".html":
             write_text(self.html, path)
         elif ending in (".png", ".svg"):
@@ -104,11 +105,6 @@ class Picture:
         """Return a painter with the appearance of this picture."""
         theme: Theme = "dark" if self.look.theme == "dark" else "light"
         return painter(self.scene, self.look.view, theme, self.look.shown, self.look.hidden)
-
-
-def _list() -> str:
-    """Return the file extensions as a phrase: ".html, .png, .svg, .gif or .mp4"."""
-    return f"{', '.join(_ENDINGS[:-1])} or {_ENDINGS[-1]}"
 
 
 def show(
@@ -218,7 +214,8 @@ def _owner(result: Result, system: System | None) -> System:
 def _times(result: Result, fps: float, speed: float) -> Array:
     """Return the times (n,) of the frames [s], equally spaced.
 
-    Raise a ModelError for invalid options, a motion of zero duration or too many frames.
+    `fps` are frames per second, `speed` seconds of the motion per second. Raise a ModelError for
+    invalid options, a motion of zero duration or too many frames.
     """
     for name, value in (("fps", fps), ("speed", speed)):
         if not (isinstance(value, (int, float)) and 0 < value < np.inf):

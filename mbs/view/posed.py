@@ -206,8 +206,7 @@ def position_of(system: System, q: Values) -> list[float]:
     Raises:
         ModelError: a name is unknown, or the number of positions is wrong.
     """
-    values = system.position(q)
-    return values
+    return system.position(q)
 
 
 # Sizes, bounds, ground and view directions of a picture.
@@ -350,7 +349,8 @@ def views(scene: PosedLinks) -> dict[str, Vector]:
     up = scene.up
     # limits of cosines of nearly equal directions; weights of front, right and up: a vertical
     # plane is seen almost from its front, a level mechanism from above, others from a corner
-    right = _unit(np.cross(up, [0.0, 0.0, 1.0]) if abs(up[0]) > 0.9 else _across(up))
+    x = np.eye(3)[0]
+    right = _unit(np.cross(up, [0.0, 0.0, 1.0]) if abs(up[0]) > 0.9 else x - float(x @ up) * up)
     front = np.cross(right, up)
     normal = plane_normal(scene)
     flat = normal is not None and abs(float(normal @ up)) < 0.1
@@ -371,12 +371,6 @@ def _is_level(scene: PosedLinks) -> bool:
     heights = scene.points @ scene.up
     spread = float(np.linalg.norm(np.ptp(scene.points, axis=0)))
     return bool(np.ptp(heights) < 0.12 * spread) and plane_normal(scene) is not None
-
-
-def _across(up: Array) -> Array:
-    """Return the component of the x axis orthogonal to up."""
-    x = np.array([1.0, 0.0, 0.0])
-    return x - float(x @ up) * up
 
 
 def plane_normal(scene: PosedLinks) -> Array | None:

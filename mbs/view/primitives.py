@@ -19,23 +19,35 @@ Rows = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class BarShape:
+class LinkShape:
+    """Primitive on one link.
+
+    Attributes:
+        role: kind of element, by which viewers show or hide it.
+        link: number of its link, 0 for the base.
+        colour: name in the palette, or "#rrggbb".
+    """
+
+    role: str
+    link: int
+    colour: str
+
+
+@dataclass(frozen=True, slots=True)
+class BarShape(LinkShape):
     """Round bar with hemispherical ends from a to b [m] in the link frame.
 
     Attributes:
         radius: radius of the bar [m].
     """
 
-    role: str
-    link: int
-    colour: str
     a: Vector
     b: Vector
     radius: float
 
 
 @dataclass(frozen=True, slots=True)
-class CylinderShape:
+class CylinderShape(LinkShape):
     """Cylinder from a to b [m] in the link frame.
 
     Attributes:
@@ -43,9 +55,6 @@ class CylinderShape:
         bore: radius of its bore [m], 0 if solid.
     """
 
-    role: str
-    link: int
-    colour: str
     a: Vector
     b: Vector
     radius: float
@@ -53,7 +62,7 @@ class CylinderShape:
 
 
 @dataclass(frozen=True, slots=True)
-class BallShape:
+class BallShape(LinkShape):
     """Sphere about a point in the link frame.
 
     Attributes:
@@ -61,15 +70,12 @@ class BallShape:
         radius: radius [m].
     """
 
-    role: str
-    link: int
-    colour: str
     at: Vector
     radius: float
 
 
 @dataclass(frozen=True, slots=True)
-class BoxShape:
+class BoxShape(LinkShape):
     """Cuboid at a pose in the link frame.
 
     Attributes:
@@ -77,15 +83,12 @@ class BoxShape:
         size: side lengths along the axes of the pose [m].
     """
 
-    role: str
-    link: int
-    colour: str
     pose: Rows
     size: Vector
 
 
 @dataclass(frozen=True, slots=True)
-class RingShape:
+class RingShape(LinkShape):
     """Ring (torus) about a direction `axis` through the point `at` [m] in the link frame.
 
     Attributes:
@@ -93,9 +96,6 @@ class RingShape:
         tube: radius of the tube [m].
     """
 
-    role: str
-    link: int
-    colour: str
     at: Vector
     axis: Vector
     radius: float
@@ -103,7 +103,7 @@ class RingShape:
 
 
 @dataclass(frozen=True, slots=True)
-class PlateShape:
+class PlateShape(LinkShape):
     """Thin convex polygon in the link frame.
 
     Attributes:
@@ -111,15 +111,12 @@ class PlateShape:
         opacity: opacity from 0 to 1.
     """
 
-    role: str
-    link: int
-    colour: str
     points: tuple[Vector, ...]
     opacity: float
 
 
 @dataclass(frozen=True, slots=True)
-class MeshShape:
+class MeshShape(LinkShape):
     """Triangle mesh at a pose in the link frame.
 
     Attributes:
@@ -127,9 +124,6 @@ class MeshShape:
         triangles: indices of points, three for each triangle.
     """
 
-    role: str
-    link: int
-    colour: str
     pose: Rows
     points: tuple[float, ...]
     triangles: tuple[int, ...]

@@ -238,7 +238,7 @@ def _element(
 ) -> SpringShape | SpanShape:
     """Return a force element between two points as a coil or a bar.
 
-    `length` is its distance [m].
+    `ends` are its end points in the link frames, `length` is their distance [m].
     """
     # diameters: springs are as wide as joints, other elements thinner
     if force.shape == "coil":
@@ -331,7 +331,8 @@ def _visual(
 ) -> Visual:
     """Return a shape of a body as a primitive at a pose (3, 4) in the frame of link number `link`.
 
-    A note is added for a simplified mesh. Raise a ModelError if a mesh cannot be read.
+    `colour` and `role` are those of the primitive. `notes` receives a text for a simplified mesh.
+    Raise a ModelError if a mesh cannot be read.
     """
     size, middle = shape.size, pose[:, 3]
     if shape.kind == "box":
@@ -360,7 +361,11 @@ def _visual(
 def _surface(
     link: int, colour: str, pose: Array, points: Array, triangles: NDArray[np.int64], role: str
 ) -> MeshShape:
-    """Return a triangle mesh with points (n, 3) [m] at a pose (3, 4), rounded to six digits."""
+    """Return a triangle mesh as a primitive at a pose (3, 4) in the frame of link number `link`.
+
+    `points` (n, 3) [m] are rounded to six digits of the largest one; `triangles` (m, 3) are indices
+    of points.
+    """
     # round to six digits of the largest coordinate, which is less than a pixel
     digits = 6 - int(np.ceil(np.log10(max(float(np.abs(points).max()), 1e-300))))
     flat = tuple(np.round(points, min(digits, 300)).ravel().tolist())

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
-import re
 from pathlib import Path
+from pkgutil import iter_modules
 
 import typer
 
@@ -13,12 +13,10 @@ SUFFIXES = (".toml", ".par", ".urdf", ".xacro", ".sdf", ".world", ".xml")
 
 
 def robot_names() -> list[str]:
-    """Return the names of the catalogue, read from the source of `mbs.robots` without CasADi."""
+    """Return the names of the catalogue, by the rule of `catalogue` but without CasADi."""
     found = importlib.util.find_spec("mbs.robots")
-    if found is None or found.origin is None:
-        return []
-    text = Path(found.origin).read_text(encoding="utf-8")
-    return re.findall(r"^from mbs\.robots\._(\w+) import \1$", text, re.MULTILINE)
+    folders = found.submodule_search_locations if found is not None else None
+    return [m.name[1:] for m in iter_modules(folders or []) if m.name.startswith("_")]
 
 
 def robots(incomplete: str) -> list[str]:

@@ -108,7 +108,10 @@ def _data(row: CountRow, optimise: bool) -> dict[str, Any]:
 
 
 def _tables(name: str, rows: Sequence[CountRow], optimise: bool) -> list[PrintedTable]:
-    """Return the tables of counts of a robot: as built, and after the optimizer if requested."""
+    """Return the tables of counts of the robot `name`: as built, and after the optimizer.
+
+    The second table requires `optimise`.
+    """
     before = [_cells(row.key, row.before) for row in rows]
     tables = [PrintedTable(f"{name}, as built", _COLUMNS, before, _COLUMNS[1:])]
     if optimise:

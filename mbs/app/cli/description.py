@@ -114,16 +114,7 @@ def _inertia(system: System, scalar: Callable[[SX], Scalar]) -> list[dict[str, A
 
 def _scalars(system: System) -> Callable[[SX], Scalar]:
     """Return the function that converts a scalar SX to a number or to the text of an expression."""
-    names = [parameter.name for parameter in system.parameters]
+    from mbs.export.robot_tables import text_function
 
-    def scalar(value: SX) -> Scalar:
-        if value.is_constant():
-            return float(value)
-        from casadi import Function
-
-        from mbs.export.languages.one_line import one_line  # imported late: loads sympy, slow
-        from mbs.operations.graph import graph_of
-
-        return one_line(graph_of(Function("value", [system.p], [value])), names)
-
-    return scalar
+    text = text_function(system)
+    return lambda value: float(value) if value.is_constant() else text(value)

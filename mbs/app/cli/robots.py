@@ -39,7 +39,7 @@ def robots(
     """
     from mbs.robots import catalogue
 
-    rows = list(structure_rows(catalogue()))
+    rows = structure_rows(catalogue())
     if mobility:
         rows = _with_mobility(rows, catalogue())
     if json:
@@ -57,12 +57,8 @@ def structure_rows(robots: Mapping[str, Callable[[], Mechanism]]) -> list[dict[s
     Args:
         robots: functions that build the robots, by name.
     """
-    return [{"name": name, **_row(build())} for name, build in robots.items()]
-
-
-def _row(mechanism: Mechanism) -> dict[str, Any]:
-    """Return kind, counts and source of a mechanism; see `StructureRow`."""
-    return {**asdict(structure(mechanism)), "source": mechanism.source}
+    built = {name: build() for name, build in robots.items()}
+    return [{"name": n, **asdict(structure(m)), "source": m.source} for n, m in built.items()]
 
 
 def _with_mobility(

@@ -183,7 +183,7 @@ def _write(result: Result, file: Path | None) -> None:
 def _draw(
     result: Result, assembled: System, plot: Path | None, film: Path | None, signals: Names
 ) -> None:
-    """Write the plot and the movie of a result, if their files are given.
+    """Write a plot to the file `plot` and a movie to the file `film`, unless they are None.
 
     `signals` are the names of the signals to plot; None for all.
     """

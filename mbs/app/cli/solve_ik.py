@@ -113,7 +113,7 @@ def solve_ik(
     from mbs.app.tasks.configurations import configurations
 
     assembled = system(robot, parameter)
-    place = _frame(frame)
+    place = int(frame) if frame is not None and frame.isdecimal() else frame
     wanted = _pose(assembled, place, pose=pose, xyz=xyz, rpy=rpy, q=q)
     found = configurations(
         assembled,
@@ -151,11 +151,6 @@ def _counts(texts: list[str] | None) -> dict[str, int] | None:
             raise ModelError(f"--redundant {name}: {value:g} is no whole number of positions")
         counts[name] = int(value)
     return counts or None
-
-
-def _frame(text: str | None) -> str | int | None:
-    """Return a frame as a number if its text consists of digits, else as a name."""
-    return int(text) if text is not None and text.isdecimal() else text
 
 
 def _pose(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,6 +11,7 @@ from typing import Any
 import numpy as np
 from casadi import Function
 
+from mbs.app.tasks.csv_text import csv_text
 from mbs.assembly import System
 from mbs.identification._base_parameters import METHODS, BaseParameters, base_parameters
 from mbs.identification.regressors import symbolic_parameters
@@ -67,13 +66,8 @@ class BaseTable:
 
     def csv(self) -> str:
         """Return the base parameters as comma-separated text: name, unit, expression and value."""
-        stream = io.StringIO()
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(("name", "unit", "expression", "value"))
-        for row in self.rows:
-            value = "" if row.value is None else repr(row.value)
-            writer.writerow((row.name, row.unit, row.expression, value))
-        return stream.getvalue()
+        head = ("name", "unit", "expression", "value")
+        return csv_text(head, ((r.name, r.unit, r.expression, r.value) for r in self.rows))
 
 
 def base(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.expressions import Scalar, number
+from mbs.formats.rotations import axis_rotation
 from mbs.loops.pose import goal
 from mbs.models import inverse_geometry, transform
 from mbs.models.catalogue.configurations import SIX, held_at, moving_joints, surplus_joints
@@ -80,7 +81,7 @@ def pose_from(xyz: Sequence[Scalar], rpy: Sequence[Scalar]) -> Array:
     T = np.eye(4)
     T[:3, 3] = [number(value, "pose") for value in xyz]
     roll, pitch, yaw = (number(value, "pose") for value in rpy)
-    T[:3, :3] = _axis_rotation(2, yaw) @ _axis_rotation(1, pitch) @ _axis_rotation(0, roll)
+    T[:3, :3] = axis_rotation(2, yaw) @ axis_rotation(1, pitch) @ axis_rotation(0, roll)
     return T
 
 
@@ -121,16 +122,6 @@ def pose_from_text(text: str) -> Array:
     T = np.eye(4)
     T[: len(parts) // 4] = np.array([number(part, "pose") for part in parts]).reshape(-1, 4)
     return T
-
-
-def _axis_rotation(axis: int, angle: float) -> Array:
-    """Return the rotation matrix (3, 3) by an angle [rad] about coordinate axis 0, 1 or 2."""
-    k, h = (axis + 1) % 3, (axis + 2) % 3
-    R = np.eye(3)
-    R[k, k] = R[h, h] = math.cos(angle)
-    R[h, k] = math.sin(angle)
-    R[k, h] = -R[h, k]
-    return R
 
 
 __all__ = [
@@ -310,13 +301,16 @@ def configurations(
 
 
 def _method(system: System, frame: str | int, method: str, held: Mapping[str, float]) -> str:
-    """Return the method to use: the search instead of "general" if not six joints are free."""
+    """Return the method to use: "search" instead of "general" unless six joints are free.
+
+    `held` are the locked and the redundant joints.
+    """
     free = [joint for joint in moving_joints(system, frame) if joint not in held]
     return "search" if method == "general" and free and len(free) != SIX else method
 
 
 def _row(one: Solution, limits: CoordinateLimits) -> Configuration:
-    """Return a solution of the inverse geometric model as a row."""
+    """Return a solution of the inverse geometric model as a row; `limits` are the joint limits."""
     return Configuration(
         q=_tuple(one.q),
         label=one.branch,

@@ -27,7 +27,7 @@ from mbs.text import did_you_mean, quoted
 
 _FLAGS = {"yes": True, "true": True, "1": True, "on": True}
 _FLAGS |= {"no": False, "false": False, "0": False, "off": False}
-_NOTHING: Mapping[str, Any] = MappingProxyType({})
+_NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class OptionRow:
 
 
 def option_values(
-    system: System, entry: Entry, given: Mapping[str, Any] = _NOTHING
+    system: System, entry: Entry, given: Mapping[str, Any] = _NO_OPTIONS
 ) -> tuple[OptionRow, ...]:
     """Return the options of a model that have an effect for a mechanism.
 
@@ -137,8 +137,6 @@ EVERY_PASS = tuple(one.name for one in PASSES)
 """Names of the passes of the optimizer, in the order in which they are applied."""
 
 MENUS = ("Geometric", "Kinematic", "Dynamic", "Identification")
-
-_NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,9 +275,10 @@ def _optimise(model: Function, passes: Sequence[str]) -> tuple[Function, tuple[S
 def _write(
     system: System, one: Entry, chosen: Mapping[str, Any], text: str, started: float
 ) -> WrittenEquations:
-    """Return the equations of a model that has plain text only.
+    """Return the equations of a model that provides plain text only.
 
-    `started` is the time at which the computation began [s].
+    `chosen` are its options, `text` is the text, `started` the time at which the computation began
+    [s].
     """
     return WrittenEquations(
         **_about(system, one, chosen),
@@ -295,7 +294,7 @@ def _write(
 
 
 def _about(system: System, one: Entry, chosen: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of `WrittenEquations` that describe the model and its options."""
+    """Return the fields of `WrittenEquations` that describe the model and its chosen options."""
     return {
         "key": one.key,
         "title": one.title,
@@ -318,9 +317,6 @@ def _language(one: Entry, system: System, language: str | None) -> str:
 
 
 # Operation counts of several models, before and after the optimizer.
-
-
-_NO_COUNT_OPTIONS: Mapping[str, str] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -346,7 +342,7 @@ def counts(
     system: System,
     keys: Sequence[str] = (),
     passes: Sequence[str] = EVERY_PASS,
-    options: Mapping[str, str] = _NO_COUNT_OPTIONS,
+    options: Mapping[str, str] = _NO_OPTIONS,
 ) -> tuple[CountRow, ...]:
     """Count the operations of models.
 
@@ -370,7 +366,10 @@ def counts(
 
 
 def _row(system: System, key: str, passes: Sequence[str], options: Mapping[str, str]) -> CountRow:
-    """Return the counts of a model, or the reason why there are none."""
+    """Return the operation counts of a model, or the reason why there are none.
+
+    `key` is the model, `passes` are those of the optimizer, `options` are texts of its options.
+    """
     one = entry(key)
     reason = one.refusal(system)
     if not reason and not one.has_function(system):

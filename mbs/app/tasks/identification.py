@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs import identification as identified_by
+from mbs.app.tasks.csv_text import csv_text
 from mbs.app.tasks.laws import number
 from mbs.app.tasks.options import keywords
 from mbs.assembly import System
@@ -215,18 +214,19 @@ class Identified:
     def csv(self) -> str:
         """Return the estimates of the base parameters as comma-separated text with a header."""
         head = ("name", "value", "deviation", "percent", "unit", "essential", "grouping")
+        words = {True: "yes", False: "no"}
         rows = (
-            (r.name, *map(repr, (r.value, r.deviation, r.percent)), r.unit, _yes(r), r.grouping)
+            (r.name, r.value, r.deviation, r.percent, r.unit, words[r.essential], r.grouping)
             for r in self.rows
         )
-        return _csv(head, rows)
+        return csv_text(head, rows)
 
     def residuals_csv(self) -> str:
         """Return time, measured and predicted right-hand sides as comma-separated text."""
         names = [effort.name for effort in self.efforts]
         head = ("time", *(f"{n}.{kind}" for n in names for kind in ("measured", "predicted")))
         pairs = np.stack([self.measured, self.predicted], axis=2).reshape(len(self.time), -1)
-        return _csv(head, (map(repr, row) for row in np.column_stack([self.time, pairs]).tolist()))
+        return csv_text(head, np.column_stack([self.time, pairs]).tolist())
 
 
 def identify(
@@ -325,17 +325,3 @@ def _efforts(residuals: Residuals, tested: Residuals) -> tuple[EffortError, ...]
             strict=True,
         )
     )
-
-
-def _yes(row: EstimateRow) -> str:
-    """Return "yes" or "no": whether the parameter is essential."""
-    return "yes" if row.essential else "no"
-
-
-def _csv(head: Sequence[str], rows: Iterable[Iterable[str]]) -> str:
-    """Return a header and rows as comma-separated text."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(head)
-    writer.writerows(rows)
-    return stream.getvalue()

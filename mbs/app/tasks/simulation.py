@@ -138,7 +138,8 @@ def _positions(
 ) -> dict[str, float] | list[float] | None:
     """Return the initial positions, except those of coordinates with prescribed motion.
 
-    None for the assembled configuration. Raise a ModelError if q0 and a configuration are given.
+    None for the assembled configuration. `known` are the values of symbols in texts. Raise a
+    ModelError if the settings contain both q0 and a configuration.
     """
     if not settings.configuration:
         return numbers(settings.q0, f"{system.name}: q0", known) or None

@@ -155,7 +155,10 @@ def singular(
 
 
 def _verdict(constant: str, factors: Sequence[DeterminantFactor]) -> str:
-    """Return the sentence that gives the condition of singularity."""
+    """Return the sentence that gives the condition of singularity.
+
+    The determinant is the product of the text `constant` and `factors`.
+    """
     if constant == "0":
         return "The determinant is zero in every configuration; name other rows or columns."
     if not factors:
@@ -195,7 +198,7 @@ def _zero(system: System, function: Function, start: Array) -> tuple[float, ...]
         root = gauss_newton(residual, start + matter * rng.uniform(-reach, reach, start.size))
         if root.converged:
             near = start + difference(system, root.x, start)
-            found.append(near if _largest(residual(near)[0]) < _OPEN else root.x)
+            found.append(near if np.max(np.abs(residual(near)[0]), initial=0.0) < _OPEN else root.x)
     closing = Closing(system, np.array(system.p_default)) if system.is_closed else None
     fitting = [q for q in found if closing is None or closing.faces(q)]
     if not fitting:
@@ -218,11 +221,6 @@ def _residual(system: System, function: Function) -> Callable[[Array], tuple[Arr
         return np.concatenate([r, value.ravel()]), np.vstack([J, gradient])
 
     return residual
-
-
-def _largest(rows: Array) -> float:
-    """Return the largest absolute value, 0 for an empty array."""
-    return float(np.max(np.abs(rows), initial=0.0))
 
 
 def _value_and_slope(system: System, function: Function) -> Function:

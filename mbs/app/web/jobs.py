@@ -76,7 +76,7 @@ async def run(
         reader.start()
         return await _answer(messages, progress)
     finally:
-        await asyncio.shield(asyncio.to_thread(_end, process, folder))
+        await asyncio.shield(asyncio.to_thread(_stop_child, process, folder))
 
 
 def _context() -> Any:
@@ -191,8 +191,8 @@ class _ProgressSender:
             self._theirs.send(("progress", label, part))
 
 
-def _end(process: BaseProcess, folder: str) -> None:
-    """Stop the child if it is still running, and remove its temporary files."""
+def _stop_child(process: BaseProcess, folder: str) -> None:
+    """Stop the child process if it is still running, and remove its folder of temporary files."""
     if process.pid is not None:
         process.join(0.05)  # [s] after sending its result, the child is about to end by itself
         if process.is_alive():

@@ -211,7 +211,10 @@ class FilesMenu:
         return row
 
     def _item(self, key: str, title: str, act: Any, keys: str = "") -> ui.menu_item:
-        """Create a menu entry; `keys` is the text of its keyboard shortcut."""
+        """Create a menu entry with a title and an action `act`, marked by `key` for tests.
+
+        `keys` is the text of its keyboard shortcut.
+        """
         with ui.menu_item(on_click=act).mark(f"robot-{key}") as item:
             ui.label(title)
             if keys:

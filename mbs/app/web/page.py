@@ -22,7 +22,7 @@ _DRAWER = 58.0
 
 
 def page_of(first: Document) -> Callable[[], Awaitable[None]]:
-    """Return the page function of the app.
+    """Return the function that builds the page of the app for each visitor.
 
     Args:
         first: robot with which new visitors start.
@@ -131,7 +131,10 @@ def _small(text: str, words: str, act: Callable[[], Awaitable[None]]) -> ui.butt
 
 
 def _make_room(rows: ui.splitter, filled: bool) -> None:
-    """Show or hide the lower half of the page, depending on whether there are results."""
+    """Show the lower half of the page if there are results (`filled`), else hide it.
+
+    `rows` is the splitter between the halves.
+    """
     if filled and rows.value > 99:
         rows.set_value(_DRAWER)
     elif not filled:

@@ -172,7 +172,7 @@ class JointSliders:
         self._typed = handle
 
     async def _slid(self, handle: Handle, event: events.GenericEventArguments) -> None:
-        """Move the coordinate of a slider."""
+        """Move a coordinate to the value of its slider, which the event contains."""
         self._held = handle
         await self._app.move(handle.index, float(event.args))
 
@@ -234,7 +234,7 @@ class PicturePanel:
             with ui.element("div").classes("app-view") as self._view:
                 ui.element("div").classes("app-canvas").props(f"id={VIEW}")
                 with ui.element("div").classes("app-over"):
-                    self._chips()
+                    self._view_buttons()
                 self._veil = ui.label().classes("app-veil")
             JointSliders(app)
         app.on_document(self.refresh)
@@ -257,7 +257,7 @@ class PicturePanel:
         else:
             self._view.classes(remove="app-stale")
 
-    def _chips(self) -> None:
+    def _view_buttons(self) -> None:
         """Create the buttons of visible kinds of elements, view directions and screenshot."""
         with ui.element("div").classes("app-chips"):
             for role, (title, usual) in _ROLES.items():
@@ -278,7 +278,7 @@ class PicturePanel:
         return session.shown.get(role, usual and not covered)
 
     def _toggle(self, role: str, title: str, usual: bool) -> None:
-        """Create the button that shows or hides a kind of elements."""
+        """Create the button that shows or hides elements of a role; `usual` is their default."""
         with ui.element("button").classes("app-chip") as chip:
             ui.label(title)
 

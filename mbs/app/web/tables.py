@@ -177,7 +177,7 @@ def rows(
 
 
 def _texts(tables: Tables, symbols: tuple[str, ...], sheet: str) -> tuple[tuple[str, ...], ...]:
-    """Return the rows of texts of a table."""
+    """Return the rows of texts of the table `sheet`, with the values of the given symbols."""
     if sheet == "symbols":
         known = dict(tables.values)
         return tuple((known.get(name, ""),) for name in symbols)
@@ -272,7 +272,7 @@ class TablePanel:
     def _rows(
         self, document: Document, sheet: str, problems: tuple[CellProblem, ...]
     ) -> list[dict[str, Any]]:
-        """Return the rows of the grid of a table."""
+        """Return the rows of the grid of the table `sheet`, with the problems of its cells."""
         return rows(self._app.session.shown_tables, document.symbols, sheet, problems)
 
     def _show_message(self, problems: tuple[CellProblem, ...]) -> None:
@@ -283,7 +283,7 @@ class TablePanel:
         self._sentence.set_visibility(bool(sentences[0]))
 
     def _tab(self, sheet: str, title: str) -> ui.element:
-        """Create the button that shows a table."""
+        """Create the button that shows the table `sheet`."""
         with ui.element("button").classes("app-tab") as tab:
             ui.label(title)
         tab.on("click", lambda: self.select(sheet))
@@ -338,13 +338,13 @@ class TablePanel:
             ).classes("app-note")
 
     async def _type(self, sheet: str, event: events.GenericEventArguments) -> None:
-        """Change a cell that the user has edited."""
+        """Change the cell that the user has edited, with the text that the event contains."""
         text = event.args.get("newValue")
         cell = Cell(sheet, int(event.args["rowIndex"]), str(event.args["colId"]))
         await self._app.edit(cell, "" if text is None else str(text))
 
     async def _clicked(self, sheet: str, event: events.GenericEventArguments) -> None:
-        """Remove a row if its button was clicked."""
+        """Remove a frame or loop if the user clicked its remove button."""
         if event.args.get("colId") != "remove":
             return
         document, row = self._app.document, int(event.args["rowIndex"])

@@ -120,7 +120,7 @@ def _unite(
 def _pairs(
     keys: Sequence[Sequence[_Key]], names: Sequence[Sequence[str]]
 ) -> list[tuple[_Key, str]]:
-    """Return (key, name) of all elements of arguments."""
+    """Return the pairs of key and name of the elements of all arguments."""
     return [
         pair
         for some, wanted in zip(keys, names, strict=True)
@@ -296,7 +296,7 @@ def _result_names(graph: Graph, outputs: Sequence[Sequence[str]]) -> Iterator[tu
 
 
 def _line_names(plan: LinePlan, wanted: dict[int, str], reserved: set[str]) -> dict[int, str]:
-    """Return the name of each line by node index: its own name, or Z1, Z2, ....
+    """Return the name of each line by node index: its name in `wanted`, or else Z1, Z2, ....
 
     `reserved` are names that must not be used for other lines.
     """
@@ -309,7 +309,7 @@ def _line_names(plan: LinePlan, wanted: dict[int, str], reserved: set[str]) -> d
 
 
 def _loads(graph: Graph, arguments: Sequence[Argument], names: Names) -> Iterator[Load]:
-    """Yield the assignments of the input elements that are used."""
+    """Yield the assignments of the elements of inputs (`arguments`) that are used."""
     used = sorted(
         (node.args, number) for number, node in enumerate(graph.nodes) if node.op == casadi.OP_INPUT
     )
@@ -319,7 +319,7 @@ def _loads(graph: Graph, arguments: Sequence[Argument], names: Names) -> Iterato
 
 
 def _stores(graph: Graph, arguments: Sequence[Argument], names: Names) -> Iterator[Store]:
-    """Yield the assignments of the output elements that are not zero."""
+    """Yield the assignments of the elements of outputs (`arguments`) that are not zero."""
     labels = names.elements[len(graph.inputs) :]
     rows = zip(graph.outputs, graph.results, arguments, labels, strict=True)
     for port, result, argument, some in rows:

@@ -9,7 +9,6 @@ from sympy.printing.c import C99CodePrinter
 
 from mbs.export._c_library import parameter_names
 from mbs.export.languages.language import (
-    Argument,
     CodeUnit,
     Language,
     kept_inside,
@@ -36,6 +35,7 @@ class C(Language):
     suffix = ".c"
     scalars_by_name = False
     squares_as_products = True
+    by_columns = True
 
     def printer(self) -> Any:
         """Return a printer that writes sympy expressions in C."""
@@ -77,13 +77,3 @@ class C(Language):
             if unit.has_zeros(out):
                 yield f"    for (int k = 0; k < {out.size}; ++k) {out.name}[k] = 0.0;"
             yield from (f"    {store};" for store in self.stores(unit, out, printer))
-
-    def place(self, argument: Argument, row: int, column: int) -> str:
-        """Return the text of an element of an input or output, stored column by column.
-
-        Args:
-            argument: input or output.
-            row: row of the element, 0-based.
-            column: column of the element, 0-based.
-        """
-        return f"{argument.name}[{row + argument.rows * column}]"

@@ -149,7 +149,10 @@ def _sum_of_angles(
     sums: Mapping[int, tuple[Term, ...] | None],
     inputs: Sequence[Sequence[str]],
 ) -> tuple[Term, ...] | None:
-    """Return the joint angles of which a node is the sum, or None if it is no such sum."""
+    """Return the joint angles of which node `number` is the sum, or None if it is no such sum.
+
+    `sums` gives this for previous nodes, `inputs` the names of the elements of each input.
+    """
     node = graph.nodes[number]
     if node.op == casadi.OP_INPUT:
         return (Term(1, joint_label(inputs[node.args[0]][node.args[1]])),)
@@ -233,7 +236,10 @@ def header(
 def _argument(
     direction: str, port: Port, argument: Argument, elements: Elements, names: Sequence[str]
 ) -> Iterator[str]:
-    """Yield the lines of an input or output: shape, and names and units of its elements."""
+    """Yield the header lines of an argument: shape, and names and units of its elements.
+
+    `direction` is "input " or "output".
+    """
     size = "" if argument.scalar else f" ({port.sparsity.size1()}, {port.sparsity.size2()})"
     text = f"{direction} {argument.name}{size}"
     if elements and len(elements) == len(names):

@@ -174,6 +174,8 @@ class Language(ABC):
         scalars_by_name: whether a scalar input or output is a variable, in contrast to an array
             with a single element.
         squares_as_products: whether x^2 is written x*x.
+        by_columns: whether an argument is an array of its elements column by column, with indices
+            from 0.
         brackets: brackets around the indices of an element.
         first: index of the first row and column.
     """
@@ -186,6 +188,7 @@ class Language(ABC):
     tail = "_"
     scalars_by_name = True
     squares_as_products = False
+    by_columns = False
     brackets = "(", ")"
     first = 1
 
@@ -220,6 +223,8 @@ class Language(ABC):
         """
         if argument.scalar and self.scalars_by_name:
             return argument.name
+        if self.by_columns:
+            return f"{argument.name}[{row + argument.rows * column}]"
         row, column = row + self.first, column + self.first
         inside = f"{row}" if argument.is_vector else f"{row}, {column}"
         return inside.join((argument.name + self.brackets[0], self.brackets[1]))

@@ -94,7 +94,7 @@ class Mathematica(Language):
 
 
 def _number(value: float) -> str:
-    """Return a constant with *^ before its exponent."""
+    """Return a constant with `*^` before its exponent."""
     text = plain_number(value)
     mantissa, _, exponent = text.partition("e")
     return f"{mantissa}*^{int(exponent)}" if exponent else text

@@ -8,7 +8,6 @@ from typing import Any
 from sympy.printing.rust import RustCodePrinter
 
 from mbs.export.languages.language import (
-    Argument,
     CodeUnit,
     Language,
     comment_lines,
@@ -50,20 +49,11 @@ class Rust(Language):
     reserved = frozenset(_WORDS.split())
     scalars_by_name = False
     squares_as_products = True
+    by_columns = True
 
     def printer(self) -> Any:
         """Return a printer that writes sympy expressions in Rust."""
         return printer_of(RustCodePrinter, self.title, repr, _FORMS, "f64::powf({0}, {1})")
-
-    def place(self, argument: Argument, row: int, column: int) -> str:
-        """Return the text of an element of an input or output, stored column by column.
-
-        Args:
-            argument: input or output.
-            row: row of the element, 0-based.
-            column: column of the element, 0-based.
-        """
-        return f"{argument.name}[{row + argument.rows * column}]"
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
         """Yield the lines of the Rust text of a function.

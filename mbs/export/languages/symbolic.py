@@ -246,7 +246,7 @@ def _product(sign: int, factors: list[Expr]) -> Expr:
 
 
 def _pow(base: Expr, exponent: Expr) -> Expr:
-    """Return a power that sympy does not evaluate."""
+    """Return base^exponent as a sympy power that is not evaluated."""
     return Pow(base, exponent, evaluate=False)
 
 
@@ -269,7 +269,7 @@ def _flip(factor: Expr) -> Expr:
 
 
 def _power(base: Expr, exponent: Expr) -> Expr:
-    """Return a power. Small integer exponents (absolute value 2 to 64) become integers."""
+    """Return base^exponent; an integer exponent of magnitude 2 to 64 becomes a sympy integer."""
     whole = exponent.is_Float and float(exponent).is_integer()
     if whole and 2 <= abs(float(exponent)) <= _LARGEST_INTEGER_POWER:
         positive = _pow(base, Integer(abs(int(exponent))))

@@ -134,7 +134,7 @@ class Flags:
             unknown=tuple(sorted(name.lower() for name in unknown)),
         )
 
-    def drives(self, group: int) -> bool:
+    def group_acts(self, group: int) -> bool:
         """Whether the actuators of an actuator group act.
 
         MuJoCo can disable groups 0 to 30; actuators of other groups always act, unless actuation as
@@ -235,7 +235,9 @@ class MjcfModel:
             of_kind("equality", model.neq, model.eq),
             of_kind("tendon", model.ntendon, model.tendon),
             tuple(
-                k for k in range(_actuators_in(model)) if flags.drives(int(model.actuator_group[k]))
+                k
+                for k in range(_actuators_in(model))
+                if flags.group_acts(int(model.actuator_group[k]))
             ),
             flags,
             {},
@@ -384,7 +386,7 @@ def _first_of(model: Any, address: str, k: int) -> int:
     return k if rows is None else int(rows[k])
 
 
-def drives(mjcf: MjcfModel) -> dict[int, dict[int, float | None]]:
+def joint_actuators(mjcf: MjcfModel) -> dict[int, dict[int, float | None]]:
     """Return for each joint its actuators, with the joint effort per unit of actuator force.
 
     A fixed tendon drives its joints with its coefficients. A spatial tendon and the rod of a
@@ -476,7 +478,7 @@ def effort_range(
     Args:
         mjcf: compiled model.
         j: index of a hinge or slide.
-        acting: joint effort per unit of actuator force, by actuator index; see `drives`.
+        acting: joint effort per unit of actuator force, by actuator index; see `joint_actuators`.
     """
     model = mjcf.data
     lower, upper = (0.0, 0.0) if acting else (-math.inf, math.inf)
@@ -528,12 +530,12 @@ class Joints:
         mjcf: compiled model.
         base: "fixed" fixes free roots to the world, "free" adds free joints to roots without
             joints; None keeps the joints of the file.
-        acting: actuators of each joint; see `drives`.
+        acting: actuators of each joint; see `joint_actuators`.
     """
 
     def __init__(self, mechanism: Mechanism, mjcf: MjcfModel, base: Base | None) -> None:
         self.mechanism, self.mjcf, self.base = mechanism, mjcf, base
-        self.acting = drives(mjcf)
+        self.acting = joint_actuators(mjcf)
 
     def connect(self, k: int, parent: Point) -> None:
         """Connect body k, which is already in the mechanism, to its parent by its joints.
@@ -1249,12 +1251,12 @@ def check_supported(mjcf: MjcfModel) -> None:
     Raises:
         DescriptionError: an unsupported element was found; the message names it.
     """
-    for checks in (_model, _joints, _tendons, _actuators):
+    for checks in (_model_faults, _joint_faults, _tendon_faults, _actuator_faults):
         for complaint in checks(mjcf):
             mjcf.refuse(complaint)
 
 
-def _model(mjcf: MjcfModel) -> Iterator[str]:
+def _model_faults(mjcf: MjcfModel) -> Iterator[str]:
     """Yield an error message for each unsupported property of the model as a whole."""
     model = mjcf.data
     for name in mjcf.flags.unknown:
@@ -1267,39 +1269,39 @@ def _model(mjcf: MjcfModel) -> Iterator[str]:
         yield "it has plugins, which mbs does not model"
 
 
-def _joints(mjcf: MjcfModel) -> Iterator[str]:
+def _joint_faults(mjcf: MjcfModel) -> Iterator[str]:
     """Yield an error message for each unsupported property of a joint."""
     model = mjcf.data
     springs, dampers = mjcf.flags.springs, mjcf.flags.dampers
     for j, name in enumerate(mjcf.joints):
         if springs and model.jnt_stiffness[j] and not mjcf.has_one_axis(j):
             yield f"ball or free joint {name!r} has a spring (stiffness), which mbs does not model"
-        if springs and _any(model, "jnt_stiffnesspoly", j):
+        if springs and _is_nonzero(model, "jnt_stiffnesspoly", j):
             yield f"joint {name!r} has a spring that is not linear, which mbs does not model"
-        if dampers and _any(model, "dof_dampingpoly", int(model.jnt_dofadr[j])):
+        if dampers and _is_nonzero(model, "dof_dampingpoly", int(model.jnt_dofadr[j])):
             yield f"joint {name!r} has damping that is not linear, which mbs does not model"
 
 
-def _tendons(mjcf: MjcfModel) -> Iterator[str]:
+def _tendon_faults(mjcf: MjcfModel) -> Iterator[str]:
     """Yield an error message for each unsupported property of a tendon."""
     model, flags = mjcf.data, mjcf.flags
     acting = {"stiffnesspoly": flags.springs, "dampingpoly": flags.dampers, "armature": True}
     for k, name in enumerate(mjcf.tendons):
         for what, acts in acting.items():
-            if acts and _any(model, f"tendon_{what}", k):
+            if acts and _is_nonzero(model, f"tendon_{what}", k):
                 yield f"tendon {name!r} has {what}, which mbs does not model"
 
 
-def _actuators(mjcf: MjcfModel) -> Iterator[str]:
+def _actuator_faults(mjcf: MjcfModel) -> Iterator[str]:
     """Yield an error message for each unsupported property of an actuator."""
     model = mjcf.data
     for k in mjcf.acting:
         for what in ("armature", "damping", "dampingpoly"):
-            if _any(model, f"actuator_{what}", k):
+            if _is_nonzero(model, f"actuator_{what}", k):
                 yield f"actuator {model.actuator(k).name!r} has {what}; give it to the joint"
 
 
-def _any(model: Any, field: str, k: int) -> bool:
+def _is_nonzero(model: Any, field: str, k: int) -> bool:
     """Whether the array `field` of a model is nonzero at index k.
 
     False if this version of MuJoCo does not have the field.
@@ -1494,8 +1496,8 @@ def _spec(mujoco: Any, path: str) -> Any:
 def _remove_unneeded(mujoco: Any, spec: Any, assets: MeshAssets) -> None:
     """Remove elements from a model specification that do not affect the motion.
 
-    A mesh without effect on the inertia is replaced by a sphere, which keeps its pose, and recorded
-    in `assets`.
+    `mujoco` is the module, `spec` the MjSpec, which is changed. A mesh without effect on the
+    inertia is replaced by a sphere, which keeps its pose, and is recorded in `assets`.
     """
     for kind in ("sensors", "pairs", "excludes", "skins", "cameras", "lights", "tuples"):
         for element in list(getattr(spec, kind)):
@@ -1525,7 +1527,7 @@ def _remove_unneeded(mujoco: Any, spec: Any, assets: MeshAssets) -> None:
 
 
 def _geoms_without_inertia(mujoco: Any, spec: Any) -> Iterator[Any]:
-    """Yield geoms with mesh or height-field files that do not contribute to the inertia."""
+    """Yield geoms of an MjSpec with mesh or height-field files that have no effect on inertias."""
     always = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
     kinds = mujoco.mjtGeom
     with_assets = (kinds.mjGEOM_MESH, kinds.mjGEOM_HFIELD, kinds.mjGEOM_SDF)

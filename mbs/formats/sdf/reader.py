@@ -41,7 +41,16 @@ from mbs.formats.files import component_name
 from mbs.formats.notes import Notes
 from mbs.formats.rotations import inverse, matrix_of_angles, quaternion_of, transform
 from mbs.formats.sdf.shared import MODEL_GRAVITY, ROTOR_INERTIA
-from mbs.formats.urdf.reader import Inertial, KeptNames, Reader, Vector, body_of
+from mbs.formats.urdf.reader import (
+    Inertial,
+    Reader,
+    UniqueNames,
+    Vector,
+    body_of,
+    limits_of,
+    not_negative,
+    robot_name,
+)
 from mbs.formats.xml import line_of, parse_xml
 from mbs.mechanism import Mechanism
 from mbs.text import did_you_mean, quoted
@@ -471,9 +480,9 @@ class _SdfFile:
         return name
 
     def _add(self, element: Element, scope: _Scope, parts: dict[str, _Part]) -> None:
-        """Register a link, joint or frame in `parts`.
+        """Register a link, joint or frame of the model `scope` in `parts`.
 
-        Raise a DescriptionError if its name is used.
+        Raise a DescriptionError if its name is missing or used.
         """
         name = scope.prefix + self._name(element)
         key = name
@@ -549,7 +558,7 @@ class _SdfBuilder:
     base: Base | None
     static: bool
     gravity: Vector
-    names: KeptNames
+    names: UniqueNames
     points: dict[str, Point] = field(default_factory=dict)
     coordinates: dict[tuple[str, str], str] = field(default_factory=dict)
     kept: dict[str, tuple[str, str]] = field(default_factory=dict)
@@ -592,7 +601,7 @@ class _SdfBuilder:
     def _name(self, part: _Part, suffix: str) -> str:
         """Return a valid and unique component name for a part, with a note if it is changed."""
         why = "another part, the world or the base of all models has this name"
-        return self.names.give(self.file.reader(part), part.name, suffix, why)
+        return self.names.assign(self.file.reader(part), part.name, suffix, why)
 
     def _unused(self, name: str) -> str:
         """Return `name` with underscores appended until it is unused, and mark it as used."""
@@ -893,11 +902,7 @@ class _SdfBuilder:
 
         A negative number counts as 0, with a note.
         """
-        value = reader.value(parent, tag, 0.0)
-        if value >= 0:
-            return value
-        reader.note("ignored", f"{tag} is {value:g}, less than zero; taken as 0", parent)
-        return 0.0
+        return not_negative(reader, parent, tag, reader.value(parent, tag, 0.0))
 
     def _limits(self, reader: SdfReader, limit: Element | None) -> tuple[float, float] | None:
         """Return (lower, upper) of a <limit> element.
@@ -905,14 +910,7 @@ class _SdfBuilder:
         None, with a note, unless both are finite and ordered.
         """
         low = reader.limit(limit, "lower", -math.inf)
-        high = reader.limit(limit, "upper", math.inf)
-        if low < high and math.isfinite(low) and math.isfinite(high):
-            return low, high
-        if (low, high) != (-math.inf, math.inf):
-            how = "have one end" if low < high else "leave it no range"
-            text = f"its limits ({low:g}, {high:g}) {how}; taken as unlimited"
-            reader.note("doubted", text, limit)
-        return None
+        return limits_of(reader, limit, low, reader.limit(limit, "upper", math.inf))
 
     # Gears and mimics.
 
@@ -939,7 +937,12 @@ class _SdfBuilder:
         self.mechanism.add(Coupling(name, driven, driver, (0.0, factor)))
 
     def _angle(self, reader: SdfReader, third: str, link: str, axis: Array) -> tuple[str, float]:
-        """Return the coordinate of the revolute joint between two links, and its sign."""
+        """Return the coordinate of the revolute joint between two links, and its sign.
+
+        The sign is +1 if the coordinate is the rotation of `link` relative to the link `third`
+        about `axis` (3,), a unit vector in world axes; it is -1 for the opposite rotation. Raise a
+        DescriptionError if no revolute joint about this axis connects them.
+        """
         file = self.file
         for key in self.between.get(frozenset((third, link)), ()):
             joint, ends = file.joints[key], self.kept[key]
@@ -1001,7 +1004,10 @@ class _Groups:
         return key
 
     def join(self, joint: str, one: str, other: str) -> None:
-        """Connect two links by a joint, and record in `closing` whether it closes a loop."""
+        """Connect the links `one` and `other` by a joint.
+
+        If they were already connected, the joint is recorded in `closing`.
+        """
         a, b = self.root(one), self.root(other)
         if a == b:
             self.closing.add(joint)
@@ -1057,10 +1063,7 @@ def read_sdf(path: str | Path, *, base: Base | None = None, strict: bool = False
         )
     file = _SdfFile(notes, _version(root, notes), _Frames(str(path)))
     world, model = _choose(root, notes)
-    name = component_name(model.get("name") or "")
-    if not name:
-        name = component_name(Path(path).stem) or "robot"
-        notes.add("completed", "<model>", f"it has no name; named {quoted(name)}", line_of(model))
+    name = robot_name(model, notes)
     gravity: Vector = MODEL_GRAVITY
     if world is not None:
         gravity = _read_world(file, world)
@@ -1077,7 +1080,7 @@ def read_sdf(path: str | Path, *, base: Base | None = None, strict: bool = False
         still = "its links are welded to the world" if base is None else "its base was given"
         reader.note("ignored", f"it is static; {still}")
     parts = (*file.links.values(), *file.joints.values(), *file.named.values())
-    names = KeptNames({"world", "base"}, {component_name(part.name) for part in parts})
+    names = UniqueNames({"world", "base"}, {component_name(part.name) for part in parts})
     _SdfBuilder(mechanism, file, base, static and base is None, gravity, names).build()
     _note_visuals(file)
     return mechanism

@@ -264,7 +264,7 @@ def _pose(element: Element, T: Array, attributes: dict[str, str]) -> None:
 
 
 def _joint(model: Element, name: str, kind: str, parent: str, child: str) -> Element:
-    """Append a joint with its type and the names of its parent and child link; return it."""
+    """Append <joint> with a name and type (`kind`) between a parent and a child link; return it."""
     joint = SubElement(model, "joint", name=name, type=kind)
     _append(joint, "parent", parent)
     _append(joint, "child", child)
@@ -272,7 +272,11 @@ def _joint(model: Element, name: str, kind: str, parent: str, child: str) -> Ele
 
 
 def _inertial(link: Element, mass: float, com: Array, tensor: Array) -> None:
-    """Append <inertial>: mass [kg], centre of mass (3,) [m], inertia about it (3, 3) [kg m^2]."""
+    """Append <inertial> to a link.
+
+    `mass` in [kg], centre of mass `com` (3,) in [m], and inertia `tensor` (3, 3) about it in [kg
+    m^2], all in the link frame.
+    """
     inertial = SubElement(link, "inertial")
     _append(inertial, "pose", text_of([*com, 0.0, 0.0, 0.0]))
     _append(inertial, "mass", mass)

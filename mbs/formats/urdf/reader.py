@@ -39,6 +39,7 @@ from mbs.expressions import plain_numbers
 from mbs.formats.files import component_name, read_bytes
 from mbs.formats.meshes import MeshFiles
 from mbs.formats.notes import Notes
+from mbs.formats.rotations import axis_rotation
 from mbs.formats.urdf.shared import MOMENTS, REDUCTION, ROTOR, UNLIMITED
 from mbs.formats.xml import line_of, parse_content
 from mbs.mechanism import Mechanism
@@ -149,7 +150,10 @@ class Reader:
         return values
 
     def _without_commas(self, element: Element | None, key: str, text: str) -> str:
-        """Replace commas between numbers by blanks, but not commas inside numbers."""
+        """Return a text with blanks in place of commas between numbers; a note reports them.
+
+        Commas inside numbers remain. `key` is the name of the quantity.
+        """
         bare = len(text.split()) == 1 and text.count(",") > 1  # "1,2,3" is three numbers
         spaced = text.replace(",", " ") if bare else _COMMA.sub(" ", text)
         if spaced != text:
@@ -229,21 +233,10 @@ def read_inertial(reader: Reader) -> Inertial:
     com, turns = origin_of(reader, inertial)
     tensor = np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]])
     for axis, angle in reversed(turns):
-        R = _axis_rotation(axis, angle)
+        R = axis_rotation("xyz".index(axis), angle)
         tensor = np.einsum("ij,jk,lk->il", R, tensor, R)
     tensor = (tensor + tensor.T) / 2
     return Inertial(reader.number(mass, "value", 0.0), com, tensor.tolist())
-
-
-def _axis_rotation(axis: str, angle: float) -> Any:
-    """Return the rotation matrix (3, 3) about the axis "x", "y" or "z" by an angle [rad]."""
-    k = "xyz".index(axis)
-    c, s = math.cos(angle), math.sin(angle)
-    R = np.eye(3)
-    i, j = (k + 1) % 3, (k + 2) % 3
-    R[i, i] = R[j, j] = c
-    R[i, j], R[j, i] = -s, s
-    return R
 
 
 # Links and joints of a URDF file, and their tree.
@@ -465,7 +458,7 @@ def _order(
 
 
 @dataclass(slots=True)
-class KeptNames:
+class UniqueNames:
     """Assign a unique name to every element: the name in the file, changed if it is not allowed.
 
     Attributes:
@@ -478,14 +471,17 @@ class KeptNames:
     wanted: set[str]
     number: dict[str, int] = field(default_factory=dict)
 
-    def give(self, reader: Reader, text: str, suffix: str, why: str) -> str:
-        """Return a name for an element, and mark it as assigned.
+    def assign(self, reader: Reader, text: str, suffix: str, why: str) -> str:
+        """Return the component name of an element, and mark it as assigned.
+
+        It is the name in the file with invalid characters replaced. If that is assigned already, a
+        suffix and a number are appended. A note reports each change.
 
         Args:
-            reader: reader of the element.
+            reader: reader of the element, which receives the note.
             text: name of the element in the file.
-            suffix: suffix that is appended if the name is not allowed.
-            why: reason why it is not allowed, for the note.
+            suffix: suffix, and name of elements without a usable name.
+            why: reason why the name is not free, for the note.
         """
         name = component_name(text) or suffix
         if name not in self.taken:
@@ -526,9 +522,9 @@ def element_names(tree: UrdfTree, base: Base | None) -> ElementNames:
     """
     moving = [joint for joint in tree.joints if joint.kind != "fixed"]
     wanted = {component_name(name) for name in (*tree.links, *(j.name for j in moving))}
-    names = KeptNames({"world"}, wanted)
+    names = UniqueNames({"world"}, wanted)
     of_joint = {
-        joint.name: names.give(
+        joint.name: names.assign(
             tree.joint(joint),
             joint.name,
             "joint",
@@ -538,7 +534,7 @@ def element_names(tree: UrdfTree, base: Base | None) -> ElementNames:
     }
     free = FREE_JOINT
     if base == "free":
-        free = names.give(
+        free = names.assign(
             tree.link(tree.root),
             FREE_JOINT,
             "free",
@@ -558,7 +554,7 @@ def element_names(tree: UrdfTree, base: Base | None) -> ElementNames:
             if reserved
             else "a joint, another link or the world has this name"
         )
-        of_link[link] = names.give(tree.link(link), link, "link", why)
+        of_link[link] = names.assign(tree.link(link), link, "link", why)
     return ElementNames(of_link, of_joint, free)
 
 
@@ -631,11 +627,7 @@ def read_urdf(
         )
     _note_unread(root, notes)
     tree = read_tree(root, notes)
-    text = root.get("name") or ""
-    name = component_name(text)
-    if not name:
-        name = component_name(Path(path).stem) or "robot"
-        notes.add("completed", "<robot>", f"it has no name; named {quoted(name)}", line_of(root))
+    name = robot_name(root, notes)
     mechanism = Mechanism(name, source=f"URDF file {Path(path).name}")
     mechanism.notes = notes.taken
     base = "free" if base == "free" and not _has_floating_base(tree) else None
@@ -646,6 +638,22 @@ def read_urdf(
     add_shapes(mechanism, tree, building.points, material_colours(root), meshes)
     meshes.note(notes)
     return mechanism
+
+
+def robot_name(element: Element, notes: Notes) -> str:
+    """Return the component name of a robot: its attribute `name`, or else the file name.
+
+    Args:
+        element: XML element of the robot.
+        notes: notes of the file, which receive a note if the element has no name.
+    """
+    name = component_name(element.get("name") or "")
+    if name:
+        return name
+    name = component_name(Path(notes.path).stem) or "robot"
+    text = f"it has no name; named {quoted(name)}"
+    notes.add("completed", f"<{element.tag}>", text, line_of(element))
+    return name
 
 
 def expanded(
@@ -760,7 +768,7 @@ def _rotors(root: Element, tree: UrdfTree) -> dict[str, float]:
     """Return the rotor inertias of transmissions, referred to their joints, Ia [kg m^2 or kg].
 
     A rotor inertia J with reduction n is n^2 J at the joint. A reduction without rotor inertia has
-    no effect, since the inputs of the models are joint efforts.
+    no effect, since the inputs of the models are joint efforts. `root` is the <robot> element.
 
     Returns:
         Rotor inertia by joint name in the file.
@@ -886,7 +894,10 @@ class _UrdfBuilder:
         """Return a moving joint as a component with axis, limits, friction and rotor inertia."""
         name, kind = self.names.joints[joint.name], joint.kind
         dynamics = joint.element.find("dynamics")
-        Fv, Fs = (_friction(reader, dynamics, key) for key in ("damping", "friction"))
+        Fv, Fs = (
+            not_negative(reader, dynamics, key, reader.number(dynamics, key, 0.0))
+            for key in ("damping", "friction")
+        )
         if kind == "floating":
             return Free(name, actuated=False, Fv=Fv, Fs=Fs, Ia=self.rotors.get(joint.name, 0.0))
         axis = reader.vector(joint.element.find("axis"), "xyz", (1.0, 0.0, 0.0))
@@ -1001,12 +1012,18 @@ def _mimic_fault(
     return "which follows it" if leader == joint.name else ""
 
 
-def _friction(reader: Reader, dynamics: Element | None, key: str) -> float:
-    """Return a friction coefficient of <dynamics>; a negative value counts as 0, with a note."""
-    value = reader.number(dynamics, key, 0.0)
+def not_negative(reader: Reader, element: Element | None, key: str, value: float) -> float:
+    """Return a value, or 0 with a note if it is negative.
+
+    Args:
+        reader: reader of the joint, which receives the note.
+        element: XML element of the value, for the note.
+        key: name of the value.
+        value: number in the file.
+    """
     if value >= 0:
         return value
-    reader.note("ignored", f"{key} is {value:g}, less than zero; taken as 0", dynamics)
+    reader.note("ignored", f"{key} is {value:g}, less than zero; taken as 0", element)
     return 0.0
 
 
@@ -1034,13 +1051,25 @@ def _limits(reader: Reader) -> tuple[float, float] | None:
     if limit is None:
         reader.note("completed", "it has no <limit>; taken as unlimited")
         return None
-    low, high = (_limit(reader, limit, key) for key in ("lower", "upper"))
+    return limits_of(reader, limit, *(_limit(reader, limit, key) for key in ("lower", "upper")))
+
+
+def limits_of(
+    reader: Reader, limit: Element | None, low: float, high: float
+) -> tuple[float, float] | None:
+    """Return position limits, or None for limits that are not both finite and ordered.
+
+    Args:
+        reader: reader of the joint, which receives a note if limits are given but not usable.
+        limit: XML element of the limits, for the note.
+        low: lower limit, minus infinity if there is none [rad or m].
+        high: upper limit, infinity if there is none [rad or m].
+    """
     if low < high and math.isfinite(low) and math.isfinite(high):
         return low, high
     if (low, high) != (-math.inf, math.inf):
-        text = f"its limits ({low:g}, {high:g}) leave it no range; taken as unlimited"
-        if low < high:
-            text = f"its limits ({low:g}, {high:g}) have one end; taken as unlimited"
+        how = "have one end" if low < high else "leave it no range"
+        text = f"its limits ({low:g}, {high:g}) {how}; taken as unlimited"
         reader.note("doubted", text, limit)
     return None
 
@@ -1135,7 +1164,11 @@ def add_shapes(
 def _shape(
     reader: Reader, frame: Point, colours: Mapping[str, Vector], meshes: MeshFiles
 ) -> tuple[Point, Shape] | None:
-    """Return the frame and the shape of a visual or collision; None if it cannot be drawn."""
+    """Return a visual or collision of a link as (frame, shape); None if it cannot be drawn.
+
+    `frame` is that of the link, `colours` are those of materials by name, `meshes` searches mesh
+    files.
+    """
     element = reader.element
     colour = None
     material = element.find("material")

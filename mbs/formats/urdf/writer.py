@@ -48,7 +48,7 @@ def _axis_name(table: LinkTable, link: FileLink) -> str:
 
 
 def _add_link(root: Element, table: LinkTable, link: FileLink, parent: str, name: str) -> None:
-    """Append a link, its joint and the transmission with the rotor of the joint."""
+    """Append the link `name`, the joint to its parent link, and the transmission with its rotor."""
     _inertial(SubElement(root, "link", name=name), *inertial_of(table, link))
     kind = {Motion.FREE: "floating", Motion.PRISMATIC: "prismatic"}.get(link.motion, "revolute")
     velocity, effort = largest_of(table, link, "URDF", UNLIMITED)
@@ -96,7 +96,7 @@ def _mimic(joint: Element, table: LinkTable, link: FileLink) -> None:
 
 
 def _add_fixed_joint(root: Element, frame: FileFrame, parent: str) -> None:
-    """Append a link with a fixed joint for a body or named frame."""
+    """Append a massless link for a body or named frame, fixed to the link `parent`."""
     SubElement(root, "link", name=frame.name)
     joint = SubElement(root, "joint", name=f"{frame.name}_fixed", type="fixed")
     SubElement(joint, "parent", link=parent)

@@ -21,7 +21,6 @@ from mbs.app.web.document.tables import (
     Cell,
     CellProblem,
     Tables,
-    Texts,
     mount,
     number,
     place_of,
@@ -99,7 +98,10 @@ def _by_name(tables: Tables, sentence: str) -> CellProblem | None:
     If several rows match, a row that the user named is preferred, then the last row. None if no row
     matches.
     """
-    by_hand = [bool(g[-1].strip() or b[-1].strip()) for g, b in _pairs(tables)]
+    by_hand = [
+        bool(g[-1].strip() or b[-1].strip())
+        for g, b in zip(tables.geometry, tables.inertia, strict=True)
+    ]
     for row in sorted(range(len(by_hand)), key=lambda k: (by_hand[k], k), reverse=True):
         joint, body = tables.joint_name(row), tables.body_name(row)
         if _is_about(sentence, body):
@@ -113,11 +115,6 @@ def _by_name(tables: Tables, sentence: str) -> CellProblem | None:
                 return CellProblem("inertia", row, other, sentence)
             return CellProblem("geometry", row, column or "name", sentence)
     return None
-
-
-def _pairs(tables: Tables) -> zip[tuple[Texts, Texts]]:
-    """Return the geometry and inertia rows of each frame."""
-    return zip(tables.geometry, tables.inertia, strict=True)
 
 
 def _by_symbol(tables: Tables, sentence: str) -> CellProblem | None:
@@ -139,7 +136,10 @@ def _after(sentence: str, name: str) -> str:
 
 
 def _column(sheet: str, words: str) -> str:
-    """Return the first word that is the name of a column; empty if there is none."""
+    """Return the first word of a text that is a column of the table `sheet`.
+
+    Empty if there is none.
+    """
     columns: Any = COLUMNS[sheet]
     for word in _WORD.findall(words):
         if (known := _ALIASES.get(word, word)) in columns:

@@ -192,7 +192,7 @@ def _table(mechanism: Mechanism) -> RobotTable:
     placed: dict[str, tuple[Point, Joint | None]] = {}
     cuts: dict[str, list[Point]] = {name: [] for name in mechanism.cuts}
     for a, b in mechanism.connections:
-        _sort(a, b, placed, cuts)
+        _record_connection(a, b, placed, cuts)
     frames = [_frame(j, *placed[body.name], numbers) for j, body in enumerate(bodies, 1)]
     rows = [_body(j, body, placed[body.name][1]) for j, body in enumerate(bodies, 1)]
     first, B = len(frames) + 1, len(cuts)
@@ -222,13 +222,13 @@ def _table(mechanism: Mechanism) -> RobotTable:
     )
 
 
-def _sort(
+def _record_connection(
     a: Point,
     b: Point,
     placed: dict[str, tuple[Point, Joint | None]],
     cuts: dict[str, list[Point]],
 ) -> None:
-    """Record a connection of points a and b in `placed` or `cuts`.
+    """Record a connection of the points a and b in `placed` or `cuts`, which are changed.
 
     `placed` gives for each body the point and the joint before it, `cuts` the points of each cut
     joint.

@@ -350,7 +350,9 @@ class Tables:
     @property
     def symbols(self) -> Texts:
         """Names of the symbols in readable cells, in the order of their first use."""
-        return tuple(dict.fromkeys(name for value in self._scalars() for name in _names(value)))
+        return tuple(
+            dict.fromkeys(p.name for value in self._scalars() for p in parameters_of(value))
+        )
 
     def rows(self, sheet: str) -> tuple[Texts, ...]:
         """Return the rows of a table as texts, each in the order of `COLUMNS[sheet]`.
@@ -382,7 +384,8 @@ class Tables:
             text: new text.
         """
         if cell.sheet == "symbols":
-            return self._with_value(self.symbols[cell.row], text)
+            values = {**dict(self.values), self.symbols[cell.row]: text}
+            return replace(self, values=tuple(values.items()))
         if cell.sheet == "general":
             return replace(self, general=_put(self.general, cell.row, text))
         rows = getattr(self, cell.sheet)
@@ -412,10 +415,6 @@ class Tables:
             row: row index of the frame (its number j minus one).
         """
         return self.inertia[row][-1].strip() or f"link{row + 1}"
-
-    def _with_value(self, name: str, text: str) -> Tables:
-        """Return the tables with another text as the value of a symbol."""
-        return replace(self, values=tuple({**dict(self.values), name: text}.items()))
 
     def _scalars(self) -> Iterator[Expression]:
         """Yield the expressions in all cells; zero for cells that cannot be read."""
@@ -503,7 +502,7 @@ def robot_table(tables: Tables) -> RobotTable:
     Raises:
         DescriptionError: a cell cannot be read, or rows contradict each other.
     """
-    read = {cell: _read(cell, text) for cell, text in tables.cells()}
+    read = {c: reader_of(*c)(text, place_of(*c)) for c, text in tables.cells()}
     frames, bodies, guess = [], [], dict(tables.guess)
     for k in range(len(tables.geometry)):
         g = {column: read[Cell("geometry", k, column)] for column in GEOMETRY_COLUMNS}
@@ -545,11 +544,6 @@ def _rotated(gravity: Sequence[Scalar], mounted: Mapping[str, Any]) -> tuple[Sca
     rotation = mounted.get("rotation")
     vector = tuple(map(expression, gravity))
     return vector if rotation is None else in_rotated_axes(vector, rotation, "mount")
-
-
-def _read(cell: Cell, text: str) -> Any:
-    """Return the value of a cell; raise a DescriptionError if its text is invalid."""
-    return reader_of(*cell)(text, place_of(*cell))
 
 
 def _frame(values: dict[str, Any]) -> FrameRow:
@@ -600,13 +594,8 @@ def _expression(text: str) -> Expression:
         return expression(0.0)
 
 
-def _names(value: Expression) -> Iterator[str]:
-    """Yield the names of the symbols in an expression."""
-    return (parameter.name for parameter in parameters_of(value))
-
-
 def _put(values: tuple[Any, ...], place: int, value: Any) -> tuple[Any, ...]:
-    """Return a tuple with another value at an index."""
+    """Return the tuple `values` with another value at the index `place`."""
     return (*values[:place], value, *values[place + 1 :])
 
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-from collections.abc import Sequence
 from functools import partial
 from typing import Any, cast
 
@@ -23,6 +20,7 @@ from mbs.app.tasks.configurations import (
     pose_of,
     rpy_of,
 )
+from mbs.app.tasks.csv_text import csv_text
 from mbs.app.tasks.equations import entry
 from mbs.app.web.app import App
 from mbs.app.web.panels.equations import open_equations
@@ -105,26 +103,17 @@ def csv_of(made: ConfigurationList) -> bytes:
     Args:
         made: result of the inverse kinematics.
     """
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
     units = zip(made.names, made.units, strict=True)
-    writer.writerow(
-        [
-            "number",
-            *(f"{name} [{unit}]" for name, unit in units),
-            *("residual", "sigma", "roots", "within_limits", "label", "family"),
-        ]
+    head = [
+        "number",
+        *(f"{name} [{unit}]" for name, unit in units),
+        *("residual", "sigma", "roots", "within_limits", "label", "family"),
+    ]
+    rows = (
+        [number, *r.q, r.residual, r.sigma, r.multiplicity, r.within_limits, r.label, r.family]
+        for number, r in enumerate(made.rows, 1)
     )
-    for number, row in enumerate(made.rows, 1):
-        writer.writerow(
-            [
-                number,
-                *map(repr, row.q),
-                *(row.residual, row.sigma, row.multiplicity, row.within_limits),
-                *(row.label, row.family),
-            ]
-        )
-    return stream.getvalue().encode()
+    return csv_text(head, rows).encode()
 
 
 _ROW_STYLE = "row => 'cursor: pointer' + (row.shown ? '; background: var(--d-accent-soft)' : '')"
@@ -256,7 +245,9 @@ class PoseFields:
         values = [*np.asarray(T, dtype=float)[:3, 3].tolist(), *rpy_of(T)]
         for field, value in zip(self._fields, values, strict=True):
             field.set_value(_text(value))
-        self._matrix.set_value("\n".join(_line(row) for row in np.asarray(T).tolist()))
+        self._matrix.set_value(
+            "\n".join("  ".join(map(_text, row)) for row in np.asarray(T).tolist())
+        )
 
     def _switch(self) -> None:
         """Show the fields of the selected form."""
@@ -275,11 +266,6 @@ def _field(name: str) -> ui.input:
 def _text(value: float) -> str:
     """Return a number as text that is read back to the same double; 0 for rounding errors."""
     return "0" if abs(value) < _ROUNDED else repr(float(value))
-
-
-def _line(row: Sequence[float]) -> str:
-    """Return a row of a matrix as text."""
-    return "  ".join(_text(value) for value in row)
 
 
 KEY = "configurations"

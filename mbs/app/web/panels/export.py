@@ -143,7 +143,10 @@ async def _picture(app: App) -> None:
 async def _run_and_download(
     app: App, suffix: str, label: str, task: Callable[..., bytes], *args: Any
 ) -> None:
-    """Run a task and download the bytes that it returns as a file named after the robot."""
+    """Run `task(system, *args)` and download the bytes that it returns.
+
+    The file has the name of the robot and a suffix; `label` describes the task to the user.
+    """
     name = f"{app.document.file_name}{suffix}"
     made = await app.run(label, task, *args)
     if made is not None:
@@ -164,7 +167,7 @@ def _head(title: str, note: str) -> None:
 
 
 def _button(title: str, marker: str, handler: Callable[[], Any]) -> None:
-    """Create a download button that is disabled while its handler runs."""
+    """Create a download button that calls `handler` and is disabled while it runs."""
     button = ui.button(title, icon="download").props("outline no-caps dense").mark(marker)
     button.style("padding: 2px 12px")
 

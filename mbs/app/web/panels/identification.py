@@ -250,7 +250,10 @@ def open_identification(app: App) -> None:
 
 
 async def _run(app: App, form: _IdentificationForm, button: ui.button, shown: ui.element) -> None:
-    """Identify the robot and show the result; show an error if there is no record."""
+    """Identify the robot from the record in the form, and show the result in `shown`.
+
+    `button` is disabled meanwhile. An error is shown if there is no record.
+    """
     if not form.content:
         app.complain("there is no record yet; upload a file of comma-separated values first")
         return

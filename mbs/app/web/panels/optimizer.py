@@ -131,7 +131,7 @@ def _show(made: tuple[CountRow, ...]) -> None:
 
 
 def _row(row: CountRow, before: Count, after: Count) -> dict[str, object]:
-    """Return the row of a model in the table of operation counts."""
+    """Return the row of a model with its operation counts before and after the optimizer."""
     saved = 100 * (1 - after.total / before.total) if before.total else 0
     return {
         "title": row.title,

@@ -94,7 +94,7 @@ def kept_rows(columns: list[Array], most: int) -> NDArray[np.intp]:
 
 
 def _line(name: str, x: Array, y: Array) -> dict[str, Any]:
-    """Return the ECharts options of a line; NaN makes a gap."""
+    """Return the ECharts options of a line of values y over x (n,); NaN makes a gap."""
     points = [[a, b if b == b else None] for a, b in zip(x.tolist(), y.tolist(), strict=True)]
     return {
         "name": name,

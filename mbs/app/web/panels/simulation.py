@@ -139,7 +139,11 @@ def build_form(system: System, texts: Texts) -> ui.button:
 
 
 def _joint(texts: Texts, start: ui.select, row: Row) -> None:
-    """Create the fields of a joint: start values, prescribed quantity and law."""
+    """Create the fields of a joint: start values, prescribed quantity and law.
+
+    They write into `texts`. The field of the position is enabled if `start` selects typed
+    positions.
+    """
     name, unit, rate, actuated = row
     ui.label(name).style("font-weight: 600").tooltip(f"position [{unit or 'none'}], rate [{rate}]")
     position = _text(texts, f"q0.{name}")
@@ -195,7 +199,7 @@ def groups_of(system: System, result: Result) -> dict[str, Charts]:
     groups: dict[str, Charts] = {title: {} for title in _KINDS.values()}
     groups |= {"Energy": {}, "Closure": {}, "Others": {}}
     for name, unit in result.units.items():
-        title, label = _place(name, joints)
+        title, label = _group_and_label(name, joints)
         groups[title].setdefault(unit, {})[label] = result[name]
     total = sum((result[name] for name in _ENERGIES), np.zeros(len(result)))
     groups["Energy"].setdefault("J", {})["total"] = total
@@ -204,7 +208,7 @@ def groups_of(system: System, result: Result) -> dict[str, Charts]:
     return {title: charts for title, charts in groups.items() if charts}
 
 
-def _place(name: str, joints: set[str]) -> tuple[str, str]:
+def _group_and_label(name: str, joints: set[str]) -> tuple[str, str]:
     """Return the group of a signal, such as "Positions", and the label of its line.
 
     `joints` are the names of all joint signals.
@@ -359,7 +363,7 @@ def open_simulation(app: App) -> None:
 
 
 async def _run(app: App, texts: Texts, shown: ui.element) -> None:
-    """Simulate the robot, show the plots and play the motion."""
+    """Simulate the robot with the texts of the form, and show plots in `shown` and the motion."""
     system = app.checked_system()
     if system is None:
         return

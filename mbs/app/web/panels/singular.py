@@ -55,7 +55,7 @@ def _show(app: App, made: Singular) -> None:
 
 
 def _factor(app: App, number: int, one: DeterminantFactor) -> None:
-    """Show a factor with a button that moves the picture to its zero."""
+    """Show factor `number` of the determinant with a button that moves the picture to its zero."""
     with in_a_row():
         show = ui.button("Show").props("flat no-caps dense").mark(f"show {number}")
         if one.configuration is None:

@@ -185,6 +185,20 @@ class LinkTable:
 # Rules of the formats with one inertia about the centre of mass and one limit per direction.
 
 
+def central_inertia(inertia: Array) -> tuple[float, Array, Array]:
+    """Return mass, centre of mass (3,) and inertia about it (3, 3) from inertial parameters.
+
+    The centre of mass of a massless body is the origin.
+
+    Args:
+        inertia: (10,) inertial parameters XX XY XZ YY YZ ZZ MX MY MZ M about the origin.
+    """
+    J = inertia[[0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(3, 3)
+    mass = float(inertia[9])
+    c = inertia[6:9] / mass if mass else np.zeros(3)
+    return mass, c, J - mass * (c @ c * np.eye(3) - np.outer(c, c))
+
+
 def inertial_of(table: LinkTable, link: FileLink) -> tuple[float, Array, Array]:
     """Return mass [kg], centre of mass (3,) [m] and inertia about it (3, 3) [kg m^2] of a link.
 
@@ -197,16 +211,12 @@ def inertial_of(table: LinkTable, link: FileLink) -> tuple[float, Array, Array]:
     Raises:
         ModelError: the link has first moments but no mass.
     """
-    ten = link.inertia
-    J = ten[[0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(3, 3)
-    mass, moment = float(ten[9]), ten[6:9]
-    if mass == 0 and np.any(moment):
+    mass, c, J = central_inertia(link.inertia)
+    if mass == 0 and np.any(link.inertia[6:9]):
         raise ModelError(
             f"{table.name}: what {link.name} carries has first moments but no mass, which no robot"
             " file can say; give it a mass"
         )
-    c = moment / mass if mass else np.zeros(3)
-    J = J - mass * (c @ c * np.eye(3) - np.outer(c, c))
     R, p = link.frame[:3, :3], link.frame[:3, 3]
     return mass, R.T @ (c - p), R.T @ J @ R
 

@@ -212,11 +212,15 @@ class RobotTable:
         )
         gravity = _gravity(self.name, self.gravity)
         values = _values(self.name, self.parameters, (frames, bodies, gravity))
-        object.__setattr__(self, "frames", tuple(_bare(row, GEOMETRY) for row in frames))
-        object.__setattr__(self, "loops", tuple(map(_plain_cut, self.loops)))
-        object.__setattr__(self, "bodies", tuple(_bare(row, BODY_SCALARS) for row in bodies))
-        object.__setattr__(self, "gravity", tuple(expression(str(g)) for g in gravity))
-        object.__setattr__(self, "parameters", values)
+        checked = {
+            "frames": tuple(_bare(row, GEOMETRY) for row in frames),
+            "loops": tuple(map(_plain_cut, self.loops)),
+            "bodies": tuple(_bare(row, BODY_SCALARS) for row in bodies),
+            "gravity": tuple(expression(str(g)) for g in gravity),
+            "parameters": values,
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
         _check_bodies(self)
         _check_loops(self)
         object.__setattr__(self, "guess", _guess(self))

@@ -9,7 +9,6 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from mbs.assembly.khalil_frames import Cut
 from mbs.components import Box, Cylinder, RollingDisc
 from mbs.components.description import OUTER_WORLD
 from mbs.components.joints import Motion
@@ -17,6 +16,7 @@ from mbs.components.shapes import Shape
 from mbs.errors import ModelError
 from mbs.expressions import Scalar, to_float
 from mbs.models.skeleton import SkeletonForce, SkeletonJoint, SkeletonLink, link_outline
+from mbs.spatial import Pose
 from mbs.text import shortened
 from mbs.view.mesh import revolve, rotation_onto
 from mbs.view.mesh_files import read_mesh
@@ -171,18 +171,23 @@ def _wheel(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator
     if radius is None or not isinstance(disc, RollingDisc):
         return
     link, center = joint.links[1], scene.points[joint.points[1]]
-    axis = scene.poses[link, :, :3] @ _rotation(scene, cut) @ np.array(disc.axis, dtype=float)
+    axis = (
+        scene.poses[link, :, :3]
+        @ _numeric(scene, cut.pose_b)[0, :, :3]
+        @ np.array(disc.axis, dtype=float)
+    )
     # radius of the tire, not thicker than joints
     tube = min(0.06 * radius, 0.7 * sizes.joint)
     direction, at = scene.local_direction(link, axis), scene.local(link, center)
     yield RingShape("loop", link, "loop", at, direction, radius - tube, tube)
 
 
-def _rotation(scene: PosedLinks, cut: Cut) -> Array:
-    """Return the rotation matrix (3, 3) of frame_b of a cut joint relative to its link frame."""
-    system = scene.system
-    R = casadi.Function("R", [system.p], [casadi.densify(cut.pose_b.R)])
-    return np.array(R([scene.parameters[p.name] for p in system.parameters]))
+def _numeric(scene: PosedLinks, *poses: Pose) -> Array:
+    """Return poses (k, 3, 4) [R p] at the values of the symbols of a scene."""
+    matrices = [casadi.densify(casadi.horzcat(pose.R, pose.p)) for pose in poses]
+    flat = casadi.Function("poses", [scene.system.p], [casadi.horzcat(*matrices)])
+    numbers: Array = np.array(flat(list(scene.parameters.values())))
+    return numbers.reshape(3, -1, 4).swapaxes(0, 1)
 
 
 def force_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
@@ -206,14 +211,12 @@ def figures(scene: PosedLinks, notes: list[str]) -> Iterator[Visual]:
         notes: list to which a warning is appended for each missing or simplified mesh.
     """
     system = scene.system
-    values = list(scene.parameters.values())
     for part in system.parts:
         shapes = part.element.drawn(scene.parameters)
         for port, frame in zip(part.element.frames, part.frames, strict=True):
             if port in shapes:
                 link, place = frame
-                both = casadi.densify(casadi.horzcat(place.R, place.p))
-                pose = np.array(casadi.Function("pose", [system.p], [both])(values))
+                pose = _numeric(scene, place)[0]
                 yield from _drawn(shapes[port], link + 1, "force", pose, notes, "force")
 
 
@@ -264,20 +267,10 @@ def solid_shapes(scene: PosedLinks) -> Iterator[BoxShape | CylinderShape]:
     """
     for body in scene.system.bodies:
         if body.solid is not None:
-            pose = _body_pose(scene, body.name)
+            pose = _numeric(scene, scene.system.frames[body.name][1])[0]
             shape = _solid(scene, body.link, pose, body.solid)
             if shape is not None:
                 yield shape
-
-
-def _body_pose(scene: PosedLinks, name: str) -> Array:
-    """Return the pose (3, 4) of the reference frame of the body `name` in its link frame."""
-    system = scene.system
-    _, place = system.frames[name]
-    both = casadi.densify(casadi.horzcat(place.R, place.p))
-    pose_of = casadi.Function("pose", [system.p], [both])
-    pose: Array = np.array(pose_of(list(scene.parameters.values())))
-    return pose
 
 
 def _solid(
@@ -318,9 +311,7 @@ def visual_shapes(scene: PosedLinks, notes: list[str]) -> Iterator[Visual]:
     system = scene.system
     if not system.shapes:
         return
-    places = [casadi.densify(casadi.horzcat(row.pose.R, row.pose.p)) for row in system.shapes]
-    flat = casadi.Function("places", [system.p], [casadi.horzcat(*places)])
-    poses = np.array(flat(list(scene.parameters.values()))).reshape(3, -1, 4).swapaxes(0, 1)
+    poses = _numeric(scene, *(row.pose for row in system.shapes))
     for row, pose in zip(system.shapes, poses, strict=True):
         link = row.link + 1
         yield from _drawn(row.shape, link, link_colour(link), pose, notes, "visual")

@@ -12,7 +12,7 @@ from mbs.export.languages.language import (
     CodeUnit,
     Language,
     kept_inside,
-    sections,
+    section_lines,
     value_text,
     wrap,
 )
@@ -60,13 +60,13 @@ class C(Language):
         yield from wrap(f"void {unit.name}({', '.join(arguments) or 'void'})")
         yield "{"
         yield from (f"    const double {load};" for load in self.loads(unit))
-        for title, lines in sections(unit):
-            if title:
-                yield f"\n    /* {title} */"
-            for line in lines:
-                yield from wrap(
-                    f"const double {line.name} = {value_text(line, printer, _CHOICE)};", "    "
-                )
+        yield from section_lines(
+            unit,
+            "\n    /* {} */",
+            lambda line: wrap(
+                f"const double {line.name} = {value_text(line, printer, _CHOICE)};", "    "
+            ),
+        )
         yield from self._stores(unit, printer)
         yield "}"
 

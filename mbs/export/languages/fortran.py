@@ -13,7 +13,7 @@ from mbs.export.languages.language import (
     Language,
     branches,
     comment_lines,
-    sections,
+    section_lines,
     wrap,
 )
 from mbs.export.languages.symbolic import printer_of
@@ -83,11 +83,9 @@ class Fortran(Language):
         yield ""
         for load in self.loads(unit):
             yield from _statement(load)
-        for title, lines in sections(unit):
-            if title:
-                yield f"\n  ! {title}"
-            for line in lines:
-                yield from branches(line, printer, _BRANCHES, _statement)
+        yield from section_lines(
+            unit, "\n  ! {}", lambda line: branches(line, printer, _BRANCHES, _statement)
+        )
         yield from self._stores(unit, printer)
         yield f"end subroutine {unit.name}"
 

@@ -13,7 +13,7 @@ from mbs.export.languages.language import (
     Language,
     comment_lines,
     grid_texts,
-    sections,
+    section_lines,
     value_text,
     wrap,
 )
@@ -66,11 +66,11 @@ class Julia(Language):
         arguments = ", ".join(argument.name for argument in unit.inputs)
         yield from wrap(f"function {unit.name}({arguments})")
         yield from (f"    {load}" for load in self.loads(unit))
-        for title, lines in sections(unit):
-            if title:
-                yield f"\n    # {title}"
-            for line in lines:
-                yield from wrap(f"{line.name} = {value_text(line, printer, _CHOICE)}", "    ")
+        yield from section_lines(
+            unit,
+            "\n    # {}",
+            lambda line: wrap(f"{line.name} = {value_text(line, printer, _CHOICE)}", "    "),
+        )
         yield ""
         for out in unit.outputs:
             yield from _output(unit, out, printer)

@@ -374,6 +374,23 @@ def sections(unit: CodeUnit) -> Iterator[tuple[str, Sequence[CodeLine]]]:
         yield "", unit.changing
 
 
+def section_lines(
+    unit: CodeUnit, comment: str, statement: Callable[[CodeLine], Iterable[str]]
+) -> Iterator[str]:
+    """Yield the text lines of all lines of code, with a comment before each section.
+
+    Args:
+        unit: function to write.
+        comment: format of a comment, with `{}` for its text.
+        statement: function that returns the text lines of a line of code.
+    """
+    for title, lines in sections(unit):
+        if title:
+            yield comment.format(title)
+        for line in lines:
+            yield from statement(line)
+
+
 def grid_texts(unit: CodeUnit, out: Argument, printer: Any, zero: str) -> list[list[str]]:
     """Return the texts of the elements of an output as a list of rows.
 

@@ -14,7 +14,7 @@ from mbs.export.languages.language import (
     comment_lines,
     grid_texts,
     plain_number,
-    sections,
+    section_lines,
     value_text,
     wrap,
 )
@@ -76,11 +76,11 @@ class Maple(Language):
         outputs = [argument.name for argument in unit.outputs]
         yield from wrap(f"local {', '.join([*unit.locals, *outputs])};", "  ")
         yield from (f"  {load.replace(' = ', ' := ', 1)};" for load in self.loads(unit))
-        for title, lines in sections(unit):
-            if title:
-                yield f"\n  # {title}"
-            for line in lines:
-                yield from wrap(f"{line.name} := {value_text(line, printer, _CHOICE)};", "  ")
+        yield from section_lines(
+            unit,
+            "\n  # {}",
+            lambda line: wrap(f"{line.name} := {value_text(line, printer, _CHOICE)};", "  "),
+        )
         yield ""
         for out in unit.outputs:
             yield from _output(unit, out, printer)

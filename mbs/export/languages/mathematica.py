@@ -15,7 +15,7 @@ from mbs.export.languages.language import (
     grid_texts,
     kept_inside,
     plain_number,
-    sections,
+    section_lines,
     value_text,
     wrap,
 )
@@ -81,11 +81,11 @@ class Mathematica(Language):
         names = ", ".join(unit.locals)
         yield from wrap(f"{unit.name}[{arguments}] := Module[{{{names}}},")
         yield from (f"  {load};" for load in self.loads(unit))
-        for title, lines in sections(unit):
-            if title:
-                yield f"\n  (* {title} *)"
-            for line in lines:
-                yield from wrap(f"{line.name} = {value_text(line, printer, _CHOICE)};", "  ")
+        yield from section_lines(
+            unit,
+            "\n  (* {} *)",
+            lambda line: wrap(f"{line.name} = {value_text(line, printer, _CHOICE)};", "  "),
+        )
         yield ""
         outputs = [_output(unit, out, printer) for out in unit.outputs]
         result = outputs[0] if len(outputs) == 1 else f"{{{', '.join(outputs)}}}"

@@ -13,7 +13,7 @@ from mbs.export.languages.language import (
     branches,
     comment_lines,
     plain_number,
-    sections,
+    section_lines,
     wrap,
 )
 from mbs.export.languages.symbolic import printer_of
@@ -70,11 +70,9 @@ class Matlab(Language):
         yield from comment_lines(unit.header, "%")
         yield ""
         yield from (f"  {load};" for load in self.loads(unit))
-        for title, lines in sections(unit):
-            if title:
-                yield f"\n  % {title}"
-            for line in lines:
-                yield from branches(line, printer, _BRANCHES, _statement, ";")
+        yield from section_lines(
+            unit, "\n  % {}", lambda line: branches(line, printer, _BRANCHES, _statement, ";")
+        )
         yield from self._stores(unit, printer)
         yield "end"
 

@@ -13,7 +13,7 @@ from mbs.export.languages.language import (
     Language,
     kept_inside,
     plain_number,
-    sections,
+    section_lines,
     value_text,
     wrap,
 )
@@ -85,11 +85,11 @@ class Python(Language):
             shapes.append(f"{argument.name}.shape" + (f"[{axes}:]" if axes else ""))
         yield from _statement("shape", f"np.broadcast_shapes({', '.join(shapes)})")
         yield from (f"    {load}" for load in self.loads(unit))
-        for title, lines in sections(unit):
-            if title:
-                yield f"\n    # {title}"
-            for line in lines:
-                yield from _statement(line.name, value_text(line, printer, _CHOICE))
+        yield from section_lines(
+            unit,
+            "\n    # {}",
+            lambda line: _statement(line.name, value_text(line, printer, _CHOICE)),
+        )
         for out in unit.outputs:
             yield ""
             yield from self._output(unit, out, printer)

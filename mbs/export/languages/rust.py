@@ -11,7 +11,7 @@ from mbs.export.languages.language import (
     CodeUnit,
     Language,
     comment_lines,
-    sections,
+    section_lines,
     value_text,
     wrap,
 )
@@ -69,13 +69,13 @@ class Rust(Language):
         yield f"#[allow({_LINTS})]"
         yield from wrap(f"pub fn {unit.name}({', '.join(arguments)}) {{")
         yield from (f"    let {load};" for load in self.loads(unit))
-        for title, lines in sections(unit):
-            if title:
-                yield f"\n    // {title}"
-            for line in lines:
-                yield from wrap(
-                    f"let {line.name}: f64 = {value_text(line, printer, _CHOICE)};", "    "
-                )
+        yield from section_lines(
+            unit,
+            "\n    // {}",
+            lambda line: wrap(
+                f"let {line.name}: f64 = {value_text(line, printer, _CHOICE)};", "    "
+            ),
+        )
         for out in unit.outputs:
             yield ""
             if unit.has_zeros(out):

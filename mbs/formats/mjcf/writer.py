@@ -21,6 +21,7 @@ from mbs.formats.link_table import (
     FileLoop,
     LinkTable,
     Place,
+    central_inertia,
 )
 from mbs.formats.mjcf.shared import numbered_name
 from mbs.formats.rotations import quaternion_of
@@ -182,15 +183,12 @@ class _MjcfWriter:
     def _add_inertia(self, body: Element, link: FileLink) -> None:
         """Append <inertial>: mass, centre of mass, principal moments about it and their axes."""
         R, p = link.frame[:3, :3].copy(), link.frame[:3, 3].copy()
-        XX, XY, XZ, YY, YZ, ZZ, *first, mass = (float(value) for value in link.inertia)
-        J = np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
-        com = np.array(first) / mass if mass else np.zeros(3)
-        if not mass and np.any(first):
+        mass, com, J = central_inertia(link.inertia)
+        if not mass and np.any(link.inertia[6:9]):
             raise self._refuse(
                 f"{body.get('name')}: it has first moments and no mass, which MuJoCo refuses",
                 "give it the inertia of a body",
             )
-        J = J - mass * (com @ com * np.eye(3) - np.outer(com, com))
         if link.motion is Motion.REVOLUTE and link.antecedent < 0:
             # moments across an axis that does not move have no effect; robot tables omit them
             J[:2, :2] += max(0.0, J[2, 2] - J[0, 0] - J[1, 1]) / 2 * np.eye(2)

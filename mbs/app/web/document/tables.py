@@ -145,11 +145,7 @@ def scalar(text: str, where: str) -> Scalar:
     Raises:
         DescriptionError: the text is not in the grammar, or too long.
     """
-    if len(text) > LONGEST_CELL:
-        raise DescriptionError(
-            f"{where}: the text has {len(text)} characters; write at most {LONGEST_CELL}"
-        )
-    return expression(text, where) if text.strip() else 0.0
+    return expression(text, where) if _short(text, where) else 0.0
 
 
 def number(text: str, where: str) -> float:

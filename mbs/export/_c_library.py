@@ -482,7 +482,8 @@ def _check_ours(file: Path) -> None:
 def _source(entries: Sequence[_Entry], library: _Library, where: str) -> str:
     """Return the text of NAME.c.
 
-    Functions of scalar operations are static, so that compilers inline them. CasADi writes others.
+    Functions of scalar operations are static, so that compilers inline them. CasADi writes other
+    functions. Raise a ModelError if it cannot write a function as C.
     """
     scalar = [entry.code for entry in entries if _is_scalar(entry, library)]
     others = [entry.code for entry in entries if not _is_scalar(entry, library)]

@@ -199,7 +199,10 @@ class RobotTable:
     extras: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check the rows and convert their values to expressions and numbers."""
+        """Check the rows and convert their values.
+
+        Raise a DescriptionError if they are inconsistent.
+        """
         if not isinstance(self.name, str) or not self.name.strip():
             raise DescriptionError(f"robot {self.name!r}: the name is not a text; give it a name")
         if not self.frames:

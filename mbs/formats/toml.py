@@ -140,7 +140,10 @@ def _frame(row: Mapping[str, Any], where: str) -> FrameRow:
 
 
 def _sigma(row: Mapping[str, Any], where: str) -> Any:
-    """Return sigma of a frame from its key `joint` or `sigma`; raise if they contradict."""
+    """Return sigma of a frame from its key `joint` or `sigma`.
+
+    Raise a DescriptionError if the joint is unknown or the two keys contradict.
+    """
     if "joint" not in row:
         return row.get("sigma", 0)
     joint = row["joint"]

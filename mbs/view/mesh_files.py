@@ -66,7 +66,10 @@ def read_mesh(path: PathLike) -> Mesh:
 
 @lru_cache(maxsize=256)
 def _read(path: str, stamp: int) -> Mesh:
-    """Read and simplify a mesh file; `stamp`, its modification time, is part of the cache key."""
+    """Read and simplify a mesh file; see `read_mesh` for the errors.
+
+    `stamp`, the modification time of the file, is part of the cache key.
+    """
     kind = Path(path).suffix.lower().removeprefix(".")
     trimesh = _module("trimesh", path)
     if kind == "dae":

@@ -41,6 +41,7 @@ def number(value: float | str, where: str, known: Mapping[str, float] | None = N
 
     Raises:
         ExpressionError: the text is not in the grammar, or has no finite value.
+        ModelError: the text contains an unknown symbol.
     """
     read = _read(value, where)
     _require_known(read, known or {}, where)
@@ -59,7 +60,8 @@ def numbers(values: Laws, where: str, known: Mapping[str, float]) -> dict[str, f
         known: values of the symbols that texts may contain.
 
     Raises:
-        ExpressionError: a value is not a number.
+        ExpressionError: a text is not in the grammar, or has no finite value.
+        ModelError: a text contains an unknown symbol.
     """
     return {name: number(value, f"{where} of {name}", known) for name, value in values.items()}
 
@@ -104,7 +106,8 @@ def law_of_motion(
         Callable (t (1, 1), q (nq, 1), v (nv, 1)) -> values (len(names), 1).
 
     Raises:
-        ExpressionError: a law cannot be read, or contains an unknown symbol.
+        ExpressionError: a law cannot be read, or has no finite value.
+        ModelError: a law contains an unknown symbol.
     """
     signals = (
         *(f"{c.name}.q" for c in system.coordinates),
@@ -134,7 +137,8 @@ def law_of_time(
         where: system and quantity, for error messages.
 
     Raises:
-        ExpressionError: the law cannot be read, or contains an unknown symbol.
+        ExpressionError: the law cannot be read, or has no finite value.
+        ModelError: the law contains an unknown symbol.
     """
     read = _law(law, where, (TIME,), known)
     if isinstance(read, Number):

@@ -33,7 +33,8 @@ def keywords(
 
     Raises:
         ExpressionError: a number cannot be read.
-        ModelError: a value is not among the choices of its option.
+        ModelError: a value is not among the choices of its option, or a number contains an unknown
+            symbol.
     """
     hints, kinds = get_type_hints(options), value_kinds(options)
     found: dict[str, Any] = {}

@@ -69,7 +69,7 @@ def simulate(
         energies, `closure_residual`, devices and sensors.
 
     Raises:
-        ExpressionError: a text cannot be read, or contains an unknown symbol.
+        ExpressionError: a text cannot be read, or has no finite value.
         MbsError: see `mbs.simulate.run`.
     """
     return run(system, **run_arguments(system, settings or SimulationSettings()), quiet=quiet)
@@ -83,8 +83,8 @@ def run_arguments(system: System, settings: SimulationSettings) -> dict[str, Any
         settings: settings of the simulation.
 
     Raises:
-        ExpressionError: a text cannot be read, or contains an unknown symbol.
-        ModelError: a name is unknown, a joint has no motor, or the method is unknown.
+        ExpressionError: a text cannot be read, or has no finite value.
+        ModelError: a name or symbol is unknown, a joint has no motor, or the method is unknown.
     """
     require_system(system)
     where = system.name

@@ -253,9 +253,9 @@ class AppPicture(AppBase):
         self._notify(self._on_configuration)
 
     async def move(self, index: int, value: float) -> None:
-        """Move a coordinate as far as the user has moved its slider.
+        """Move a coordinate to a position, with the loops closed.
 
-        If several moves of a coordinate arrive during a computation, only the last of them is made.
+        Of several moves of a coordinate that arrive during a computation, only the last is made.
 
         Args:
             index: index of the coordinate in q.

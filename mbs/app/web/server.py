@@ -139,7 +139,10 @@ def robot_document(robot: str, gravity: str = "", mount: Sequence[str] = ()) -> 
 
 
 def _document(robot: str) -> Document:
-    """Return the document of a robot from the catalogue or a file; see `robot_document`."""
+    """Return the document of a robot from the catalogue or a file.
+
+    Raise an MbsError if the robot does not exist or the file is malformed.
+    """
     from mbs.app.web.document.document import Document
     from mbs.robots import catalogue
 

@@ -332,7 +332,8 @@ class Session:
         """Return the system of the document as typed.
 
         Raises:
-            MbsError: a cell has an error, or the mechanism cannot be assembled.
+            MbsError: a cell has an error, the mechanism cannot be assembled, or the assembly has
+                not ended yet.
         """
         if self.document == self.good and self.system is not None:
             return self.system

@@ -948,7 +948,8 @@ def _add_tendon(
 ) -> None:
     """Add tendon k, named `name`, as a spring or fixed tendon, if it exerts a force.
 
-    `sites` are the frames of the sites.
+    `sites` are the frames of the sites. Raise a DescriptionError for a spatial tendon that exerts
+    forces and is not a linear spring between two sites.
     """
     model, flags = mjcf.data, mjcf.flags
     if model.tendon_limited[k] and flags.limits:
@@ -1003,6 +1004,7 @@ def _add_compensation(mechanism: Mechanism, mjcf: MjcfModel, k: int, body: Point
     """Add the force that compensates the weight of body k (gravcomp) at its centre of mass.
 
     `body` is the frame of the body. Nothing is added if the body cannot move or has no weight.
+    Raise a DescriptionError if only some of its joints compensate gravity by their actuators.
     """
     model = mjcf.data
     share, joints = float(model.body_gravcomp[k]), mjcf.joints_above(k)

@@ -378,7 +378,17 @@ class _SdfFile:
         return SdfReader(f"{part.element.tag} {quoted(part.name)}", part.element, self.notes)
 
     def add_model(self, element: Element, name: str, outer: _Scope | None) -> None:
-        """Register links, joints and frames of a model and its nested models, without poses."""
+        """Register links, joints and frames of a model and its nested models, without poses.
+
+        Args:
+            element: XML element of the model.
+            name: full name of the model.
+            outer: model that contains it; None for the outermost model.
+
+        Raises:
+            DescriptionError: a name is missing or used twice, or an unsupported element changes the
+                motion.
+        """
         prefix = "" if outer is None else f"{name}::"
         scope = _Scope("__model__" if outer is None else name, prefix)
         reader = SdfReader(f"model {quoted(name)}", element, self.notes)
@@ -403,7 +413,16 @@ class _SdfFile:
         )
 
     def place_model(self, element: Element, name: str, outer: _Scope | None) -> None:
-        """Set the poses of a model, its parts and nested models, after all names are registered."""
+        """Set the poses of a model, its parts and nested models, after all names are registered.
+
+        Args:
+            element: XML element of the model.
+            name: full name of the model.
+            outer: model that contains it; None for the outermost model.
+
+        Raises:
+            DescriptionError: a pose cannot be read or refers to an unknown frame.
+        """
         reader = SdfReader(f"model {quoted(name)}", element, self.notes)
         scope = _Scope("__model__", "") if outer is None else _Scope(name, f"{name}::")
         relative, T = reader.pose(element)
@@ -599,7 +618,10 @@ class _SdfBuilder:
             mechanism.add_frame(self._name(frame, "frame"), _at(self.points[carrier], pose))
 
     def _name(self, part: _Part, suffix: str) -> str:
-        """Return a valid and unique component name for a part, with a note if it is changed."""
+        """Return a valid and unique component name for a part, with a note if it is changed.
+
+        `suffix` is appended to a name that is already used.
+        """
         why = "another part, the world or the base of all models has this name"
         return self.names.assign(self.file.reader(part), part.name, suffix, why)
 
@@ -623,7 +645,9 @@ class _SdfBuilder:
     def _groups(self) -> _Groups:
         """Return the groups of connected links, and record the links of each joint in `kept`.
 
-        Fixed joints are processed first, so that they do not close loops.
+        Fixed joints are processed first and joints marked as loop joints last; the remaining joints
+        that connect links of one group close loops. Raise a DescriptionError if a joint refers to
+        an unknown link or connects a link with itself.
         """
         file = self.file
         groups = _Groups({key: key for key in ("world", *file.links)})
@@ -905,9 +929,9 @@ class _SdfBuilder:
         return not_negative(reader, parent, tag, reader.value(parent, tag, 0.0))
 
     def _limits(self, reader: SdfReader, limit: Element | None) -> tuple[float, float] | None:
-        """Return (lower, upper) of a <limit> element.
+        """Return the position limits (lower, upper) of a joint from its <limit> element.
 
-        None, with a note, unless both are finite and ordered.
+        None unless both are finite and ordered; see `limits_of`.
         """
         low = reader.limit(limit, "lower", -math.inf)
         return limits_of(reader, limit, low, reader.limit(limit, "upper", math.inf))

@@ -891,7 +891,10 @@ class _UrdfBuilder:
         return body.frame
 
     def _joint(self, reader: Reader, joint: JointElement) -> Joint:
-        """Return a moving joint as a component with axis, limits, friction and rotor inertia."""
+        """Return a moving joint as a component with axis, limits, friction and rotor inertia.
+
+        Raise a DescriptionError if its axis has zero length.
+        """
         name, kind = self.names.joints[joint.name], joint.kind
         dynamics = joint.element.find("dynamics")
         Fv, Fs = (
@@ -1043,9 +1046,10 @@ def _limit(reader: Reader, limit: Element | None, key: str) -> float:
 
 
 def _limits(reader: Reader) -> tuple[float, float] | None:
-    """Return the position limits (lower, upper); None if they are missing, infinite or invalid.
+    """Return the position limits (lower, upper) of a joint from its <limit> element.
 
-    A note reports each of these cases except two infinite limits.
+    None, with a note, without this element. None unless both are finite and ordered; see
+    `limits_of`.
     """
     limit = reader.element.find("limit")
     if limit is None:

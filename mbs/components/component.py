@@ -589,7 +589,11 @@ def with_points(component: C, change: Callable[[Point], Point]) -> C:
 def component_name(text: str) -> str:
     """Return a valid component name: the text with blanks, dots and quotes replaced by underscores.
 
-    Invisible characters are removed, and the name is cut to 80 characters.
+    Invisible characters are removed, and the name is cut to `LONGEST_NAME` characters. The name is
+    empty if nothing remains.
+
+    Args:
+        text: name in a file.
     """
     return seen(_NOT_IN_NAMES.sub("_", text.strip()))[:_LONGEST_NAME]
 

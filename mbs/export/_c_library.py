@@ -31,6 +31,7 @@ from mbs.text import in_c_comment, quoted
 
 
 def _words(text: str) -> list[str]:
+    """Return the words of a text, which blanks and line breaks separate."""
     return text.split()
 
 
@@ -83,7 +84,13 @@ _OF_CASADI = ("null", "jac", "hess")
 
 
 def library_name(folder: str) -> str:
-    """Return the name of the files and of the CMake target for a folder name."""
+    """Return the name of the files and of the CMake target of a library.
+
+    It is the folder name as a C identifier: `2r` becomes models_2r, and `math` becomes math_models.
+
+    Args:
+        folder: name of the folder, without its path.
+    """
     name = re.sub(r"\W", "_", folder, flags=re.ASCII)
     if not re.search(r"[A-Za-z0-9]", name):
         return "models"
@@ -100,8 +107,8 @@ def check_function_names(names: Sequence[str], where: str) -> None:
         where: name of the library, for the error message.
 
     Raises:
-        ModelError: a name is no identifier, is reserved in C or C++, or two names lead to the same
-            name in C.
+        ModelError: a name is no identifier or is reserved in C or C++, or two names result in the
+            same name of a generated C function or macro.
     """
     owner: dict[str, str] = {}
     for name in names:
@@ -288,7 +295,11 @@ def c_library(options: CLibraryArguments) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class _Library(CLibraryOptions):
-    """Options of a library, and the name of its files."""
+    """Options of a C library with the name of its files.
+
+    Attributes:
+        name: name of the files without suffix, and of the CMake target.
+    """
 
     name: str
 
@@ -304,6 +315,7 @@ class _Library(CLibraryOptions):
 
 
 def _library(place: Path, options: CLibraryOptions) -> _Library:
+    """Return the options of a library; raise an ExportError if they are invalid."""
     for sentence in faults(options):
         raise ExportError(f"{place}: {sentence}")
     if options.real == "float" and options.target != "bare":
@@ -337,6 +349,10 @@ class _Entry:
 def _entries(
     functions: Functions, where: str, library: _Library
 ) -> tuple[list[_Entry], dict[str, System]]:
+    """Return the functions of the library and the systems to simulate, by their names in C.
+
+    Raise a ModelError if a name is invalid or a model cannot be written.
+    """
     pairs = _pairs(functions)
     if not pairs:
         raise ModelError(f"{where}: there is no function to write; give at least one")
@@ -371,7 +387,10 @@ def _entries(
 def _check_handwritten(
     functions: Sequence[tuple[str, Function]], where: str, library: _Library
 ) -> None:
-    """Raise ModelError for single precision or names that conflict with handwritten C code."""
+    """Raise a ModelError if handwritten C code of models does not fit to the library.
+
+    This is so for single precision, and for names that conflict with names in that code.
+    """
     text = handwritten_text([function for _, function in functions])
     if text and library.real == "float":
         raise ModelError(
@@ -388,7 +407,7 @@ def _check_handwritten(
 
 
 def _pairs(functions: Any) -> list[tuple[str, Model]]:
-    """Return pairs of name in C and model."""
+    """Return pairs of name in C and model; raise a ModelError for other objects."""
     if isinstance(functions, Mapping):
         for function in functions.values():
             _require_model(function)
@@ -401,13 +420,14 @@ def _pairs(functions: Any) -> list[tuple[str, Model]]:
 
 
 def _require_model(model: object) -> None:
+    """Raise a ModelError if a model is neither a System nor a Function with named arguments."""
     if not isinstance(model, System):
         require_function(model)
         require_names(cast("Function", model))
 
 
 def _name(model: Model) -> str:
-    """Return the name in C of a model. In the name of a System, invalid characters become _."""
+    """Return the name of a model in C; invalid characters in the name of a System become "_"."""
     if isinstance(model, Function):
         return model.name()
     text = re.sub(r"[^A-Za-z0-9]+", "_", model.name).lstrip("_")
@@ -415,6 +435,7 @@ def _name(model: Model) -> str:
 
 
 def _entry(name: str, model: Function, library: _Library) -> _Entry:
+    """Return a function of the library with its check and the names of its arguments in C."""
     taken = ["w", "k", "arg", "res", "iw", "mem", name, f"{name}_eval", f"{name.upper()}_SZ_W"]
     taken += ["status", "wrong", "holds", "answer", "failed", library.type]
     inputs = parameter_names(model.name_in(), taken)
@@ -426,7 +447,7 @@ def _entry(name: str, model: Function, library: _Library) -> _Entry:
 
 
 def _code(name: str, model: Function, check: StatusCheck | None) -> Function:
-    """Return the function under a name, with dense inputs and outputs and the check as last output.
+    """Return a model under a name, with dense inputs and outputs and the check as last output.
 
     Common subexpressions of both, such as sines and cosines of joint angles, are computed once.
     """
@@ -444,7 +465,7 @@ def _code(name: str, model: Function, check: StatusCheck | None) -> Function:
 
 
 def _check_ours(file: Path) -> None:
-    """Raise ExportError if a file exists that mbs did not write."""
+    """Raise an ExportError if a file exists that mbs did not write."""
     try:
         with file.open(encoding="utf-8", errors="replace") as stream:
             first = stream.readline()
@@ -461,7 +482,8 @@ def _check_ours(file: Path) -> None:
 def _source(entries: Sequence[_Entry], library: _Library, where: str) -> str:
     """Return the text of NAME.c.
 
-    Functions of scalar operations are static, so that compilers inline them. CasADi writes others.
+    Functions of scalar operations are static, so that compilers inline them. CasADi writes other
+    functions. Raise a ModelError if it cannot write a function as C.
     """
     scalar = [entry.code for entry in entries if _is_scalar(entry, library)]
     others = [entry.code for entry in entries if not _is_scalar(entry, library)]
@@ -480,17 +502,19 @@ def _source(entries: Sequence[_Entry], library: _Library, where: str) -> str:
 
 
 def _is_scalar(entry: _Entry, library: _Library) -> bool:
-    """Whether the code is written as scalar operations, and not by CasADi (calls and maps)."""
+    """Whether mbs writes the code as scalar operations; CasADi writes calls and maps."""
     return entry.code.is_a("SXFunction") or (library.bare and not handwritten_text([entry.code]))
 
 
 def _parameters(entry: _Entry, real: str) -> str:
+    """Return the C parameters of a function: inputs, then outputs, as pointers to `real`."""
     inputs = [f"const {real} *{name}" for name in entry.inputs]
     outputs = [f"{real} *{name}" for name in entry.outputs]
     return ", ".join([*inputs, *outputs])
 
 
 def _wrapper(entry: _Entry, library: _Library) -> str:
+    """Return the C text of NAME_eval, which calls the generated code and checks its arguments."""
     lines = [f"  arg[{k}] = {name};" for k, name in enumerate(entry.inputs)]
     lines += [f"  res[{k}] = {name};" for k, name in enumerate(entry.outputs)]
     words = {"real": library.type, "count": len(entry.statuses)}
@@ -512,6 +536,7 @@ def _wrapper(entry: _Entry, library: _Library) -> str:
 
 
 def _checking_body(entry: _Entry, library: _Library, call: str) -> str:
+    """Return the C statements that call a function and set its status."""
     model = entry.model
     inputs = [(name, model.numel_in(k)) for k, name in enumerate(entry.inputs)]
     outputs = [(name, model.numel_out(k)) for k, name in enumerate(entry.outputs)]
@@ -528,7 +553,10 @@ def _checking_body(entry: _Entry, library: _Library, call: str) -> str:
 
 
 def _all_finite(arrays: Iterable[tuple[str, int]], real: Real) -> str:
-    """Return the C condition that all values are finite: one sum for few values, else a loop."""
+    """Return a C condition that all values are finite: one sum for few values, else a loop.
+
+    `arrays` are pairs of name and number of elements.
+    """
     given = [(name, n) for name, n in arrays if n]
     one_by_one = " && ".join(f"mbs__finite({name}, {n})" for name, n in given) or "1"
     if not 0 < sum(n for _, n in given) <= _FEW:
@@ -540,6 +568,7 @@ def _all_finite(arrays: Iterable[tuple[str, int]], real: Real) -> str:
 
 
 def _header(entries: Sequence[_Entry], steps: Mapping[str, StepTexts], library: _Library) -> str:
+    """Return the text of NAME.h with the prototypes of functions and simulations (`steps`)."""
     guard = f"MBS_{library.name.upper()}_H"
     texts = [STATUS]
     if library.bare:
@@ -555,6 +584,7 @@ def _header(entries: Sequence[_Entry], steps: Mapping[str, StepTexts], library: 
 
 
 def _prototype(entry: _Entry, library: _Library) -> str:
+    """Return the documented C prototype of a function."""
     model = entry.model
     lines = [
         f" *  @param[in]  {name}  ({model.size1_in(k)}, {model.size2_in(k)})"
@@ -580,7 +610,7 @@ def _prototype(entry: _Entry, library: _Library) -> str:
 
 
 def _returns(entry: _Entry, library: _Library) -> str:
-    """Return the possible status codes of a call as text."""
+    """Return the text of the possible status codes of a call."""
     if not library.checked:
         return "MBS_OK: nothing is checked"
     every = ["MBS_OK", "MBS_NOT_FINITE", *dict.fromkeys(entry.statuses)]
@@ -588,19 +618,20 @@ def _returns(entry: _Entry, library: _Library) -> str:
 
 
 def _scratch(entry: _Entry, library: _Library) -> int:
-    """Return the number of elements of the work array w."""
+    """Return the number of elements of the work array w of a function."""
     if _is_scalar(entry, library):
         return bare_source([entry.code], library.real)[1]
     return max(1, entry.code.sz_w())
 
 
 def _elements(model: Function, name: str) -> str:
-    """Return names and units of the elements of an input or output, empty if unknown."""
+    """Return the text of names and units of the elements of an argument, empty if unknown."""
     known = model.elements(name) if isinstance(model, ModelFunction) else []
     return ": " + ", ".join(in_c_comment(f"{e} [{unit}]") for e, unit in known) if known else ""
 
 
 def _example(entries: Sequence[_Entry], steps: Mapping[str, StepTexts], library: _Library) -> str:
+    """Return the text of example.c, which calls all functions and simulations (`steps`)."""
     head = (
         f"/* {_MARK}. */\n#include <stdio.h>\n"
         f'#include "{library.name}.h"\n\nint main(void) {{\n  int failed = 0;\n'
@@ -635,10 +666,17 @@ def _example_call(entry: _Entry, library: _Library) -> str:
 
 
 def example_input(model: Function, k: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """Return the values (rows, columns) of input k in the example program.
+    """Return the values of an input in the example program, which are irregular.
 
-    Values are irregular. Parameters have their default values. For mechanisms with loops,
-    quaternions or parameters, positions come from the assembled configuration.
+    Parameters have their default values. For mechanisms with loops, quaternions or parameters,
+    positions come from the assembled configuration.
+
+    Args:
+        model: Function of the library.
+        k: index of the input.
+
+    Returns:
+        Values (rows, columns).
     """
     rows, columns = model.size_in(k)
     numbers = np.arange(rows * columns, dtype=float)
@@ -660,6 +698,7 @@ def example_input(model: Function, k: int) -> np.ndarray[tuple[int, ...], np.dty
 
 
 def _cmake(library: _Library, more: Sequence[str]) -> str:
+    """Return the text of CMakeLists.txt; `more` are further C files."""
     name = library.name
     example = f"add_executable(example example.c)\ntarget_link_libraries(example {name})\n"
     if library.bare:

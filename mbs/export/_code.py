@@ -30,7 +30,7 @@ def code(
     parameters come first.
 
     Args:
-        function: Function of scalar operations, or one that can be expanded to them.
+        function: Function of scalar operations, or a Function that can be expanded to them.
         language: "c", "fortran", "matlab" or "octave", "maple", "mathematica", "python", "julia",
             "rust", "latex", "symoro" for the classic listing of equations, or a user-defined
             `Language`.
@@ -41,8 +41,8 @@ def code(
         Text of a complete function, subroutine, procedure or document.
 
     Raises:
-        ModelError: the language is unknown, function is not a Function, or it has operations
-            that the language does not support.
+        ModelError: the language is unknown, function is not a Function or has no output, the name
+            is invalid, or the language does not support an operation.
         ExportError: the file cannot be written.
     """
     from mbs.export.languages.build import build  # imports sympy, which takes a second
@@ -58,6 +58,7 @@ def code(
 
 
 def _check_name(name: str) -> str:
+    """Return a name if it is an identifier of ASCII letters; raise a ModelError otherwise."""
     if isinstance(name, str) and re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII):
         return name
     raise ModelError(

@@ -74,12 +74,20 @@ class Connection:
 
 
 def ssp_kind(variable: Any) -> str | None:
-    """Return the connector type of a variable of fmpy, or None if SSP 1.0 has no such type."""
+    """Return the connector type of a variable, such as "Real"; None if SSP 1.0 has no such type.
+
+    Args:
+        variable: variable of an FMU, as read by fmpy.
+    """
     return None if getattr(variable, "dimensions", None) else _KINDS.get(variable.type)
 
 
 def unit_of(variable: Any) -> str | None:
-    """Return the unit name of a variable of fmpy, also from its declared type, or None."""
+    """Return the unit name of a real variable, or of its declared type; None without a unit.
+
+    Args:
+        variable: variable of an FMU, as read by fmpy.
+    """
     declared = variable.declaredType
     unit = variable.unit or (None if declared is None else declared.unit)
     return unit if ssp_kind(variable) == "Real" and unit else None
@@ -139,11 +147,13 @@ def structure_description(
 
 
 def _tag(name: str) -> str:
+    """Return the full XML name of "prefix:name"."""
     prefix, local = name.split(":")
     return f"{{{_SPACES[prefix]}}}{local}"
 
 
 def _component(parent: Element, part: SspPart) -> None:
+    """Append a component with its connectors and start values to the XML element `parent`."""
     element = SubElement(
         parent,
         _tag("ssd:Component"),
@@ -165,6 +175,7 @@ def _component(parent: Element, part: SspPart) -> None:
 
 
 def _connector(parent: Element, variable: Any) -> None:
+    """Append a connector of a variable with its type and unit."""
     connector = SubElement(
         parent, _tag("ssd:Connector"), name=variable.name, kind=variable.causality
     )
@@ -177,6 +188,7 @@ def _connector(parent: Element, variable: Any) -> None:
 
 
 def _bindings(parent: Element, part: SspPart) -> None:
+    """Append the start values of a component to its XML element `parent`."""
     bindings = SubElement(parent, _tag("ssd:ParameterBindings"))
     binding = SubElement(
         bindings, _tag("ssd:ParameterBinding"), type="application/x-ssp-parameter-set"
@@ -192,6 +204,7 @@ def _bindings(parent: Element, part: SspPart) -> None:
 
 
 def _write_connections(parent: Element, connections: list[Connection]) -> None:
+    """Append the connections of the system."""
     if not connections:
         return
     group = SubElement(parent, _tag("ssd:Connections"))
@@ -207,7 +220,7 @@ def _write_connections(parent: Element, connections: list[Connection]) -> None:
 
 
 def _units(parts: list[SspPart]) -> dict[str, dict[str, str]]:
-    """Return dict from the unit names of all connectors to their BaseUnit attributes."""
+    """Return the BaseUnit attributes of the units of all connectors, by unit name."""
     return {
         unit: unit_exponents(part.description, unit) or {}
         for part in parts
@@ -217,6 +230,7 @@ def _units(parts: list[SspPart]) -> dict[str, dict[str, str]]:
 
 
 def _add_units(parent: Element, units: Mapping[str, Mapping[str, str]]) -> None:
+    """Append the definitions of units."""
     for name in sorted(units):
         element = SubElement(parent, _tag("ssc:Unit"), name=name)
         SubElement(element, _tag("ssc:BaseUnit"), dict(units[name]))
@@ -277,7 +291,7 @@ def ssp(
 
 
 def _files(components: Any) -> dict[str, Path]:
-    """Return dict from component name to path of the FMU, after checks of the names."""
+    """Return the path of the FMU of each component; raise an ExportError for invalid names."""
     if not isinstance(components, Iterable):
         raise ExportError(f"SSP: components is {quoted(components)}; give a dict of names to paths")
     if isinstance(components, Mapping):
@@ -304,6 +318,7 @@ def _files(components: Any) -> dict[str, Path]:
 
 
 def _content(part: str, file: Path) -> bytes:
+    """Return the content of an FMU file; raise an ExportError if it cannot be read."""
     try:
         return file.read_bytes()
     except OSError as error:
@@ -314,6 +329,10 @@ def _content(part: str, file: Path) -> bytes:
 
 
 def _describe(part: str, file: Path) -> Any:
+    """Return the model description of an FMU, as read by fmpy.
+
+    Raise an ExportError if the file is not an FMU with co-simulation of FMI 2.0 or 3.0.
+    """
     import fmpy
 
     try:
@@ -331,7 +350,10 @@ def _describe(part: str, file: Path) -> Any:
 
 
 def _sources(files: Mapping[str, Path], contents: Mapping[str, bytes]) -> dict[str, str]:
-    """Return the path of each component's FMU in the archive. Identical FMUs share a path."""
+    """Return the path in the archive of the FMU of each component; equal FMUs share a path.
+
+    `files` are the paths of the FMUs, `contents` their contents, by component.
+    """
     paths: dict[bytes, str] = {}
     for part, file in files.items():
         if contents[part] not in paths:
@@ -345,7 +367,10 @@ def _sources(files: Mapping[str, Path], contents: Mapping[str, bytes]) -> dict[s
 def _start_values(
     described: Mapping[str, Any], start: Mapping[str, float]
 ) -> dict[str, dict[str, float]]:
-    """Return the start values by component, after checks of names and values."""
+    """Return the start values of each component, by variable name.
+
+    Raise an ExportError if a variable is unknown or cannot be set, or a value is not finite.
+    """
     found: dict[str, dict[str, float]] = {}
     for address, value in start.items():
         part, variable = _variable(described, "start", address)
@@ -361,13 +386,18 @@ def _start_values(
 
 
 def _settable(variable: Any) -> bool:
+    """Whether the value of a variable can be set before initialization."""
     if ssp_kind(variable) in (None, "String") or variable.variability == "constant":
         return False
     return variable.causality == "input" or variable.initial in ("exact", "approx")
 
 
 def _variable(described: Mapping[str, Any], what: str, address: object) -> tuple[str, Any]:
-    """Return component name and variable of an address such as `robot.j1.tau`."""
+    """Return component name and variable of an address such as `robot.j1.tau`.
+
+    `described` are the model descriptions of the components, `what` is for error messages. Raise an
+    ExportError if there is no such variable.
+    """
     part, dot, name = address.partition(".") if isinstance(address, str) else ("", "", "")
     if not dot:
         raise ExportError(
@@ -389,6 +419,7 @@ def _variable(described: Mapping[str, Any], what: str, address: object) -> tuple
 def _connections(
     parts: Mapping[str, SspPart], connections: Iterable[tuple[str, str]]
 ) -> list[Connection]:
+    """Return the connections; raise an ExportError if an end is unknown or two ends do not fit."""
     described = {name: part.description for name, part in parts.items()}
     fed: dict[tuple[str, str], str] = {}
     links: list[Connection] = []
@@ -415,6 +446,10 @@ def _connections(
 
 
 def _check_causality(address: str, variable: Any, expected: str, rule: str) -> None:
+    """Raise an ExportError if a variable is not `expected` (input or output) or has no SSP type.
+
+    `rule` is the end of the error message.
+    """
     if variable.causality != expected:
         what = (
             "no input or output"
@@ -430,6 +465,10 @@ def _check_causality(address: str, variable: Any, expected: str, rule: str) -> N
 
 
 def _check_types(source: tuple[str, Any], target: tuple[str, Any]) -> None:
+    """Raise an ExportError if the types of the two ends of a connection differ.
+
+    An end is (address, variable of the FMU).
+    """
     kinds = [ssp_kind(variable) for _, variable in (source, target)]
     if kinds[0] != kinds[1]:
         raise ExportError(
@@ -439,7 +478,11 @@ def _check_types(source: tuple[str, Any], target: tuple[str, Any]) -> None:
 
 
 def _check_units(source: tuple[str, Any, Any], target: tuple[str, Any, Any]) -> None:
-    """Raise ExportError if the units of two ends differ. No unit and "1" match every unit."""
+    """Raise an ExportError if the units of the two ends of a connection differ.
+
+    An end is (address, variable of the FMU, model description). No unit and the unit "1" fit to
+    every unit.
+    """
     ends = [(unit_of(variable), description) for _, variable, description in (source, target)]
     (given, _), (expected, _) = ends
     if {given, expected} & {None, "1"}:
@@ -454,6 +497,10 @@ def _check_units(source: tuple[str, Any, Any], target: tuple[str, Any, Any]) -> 
 
 
 def _span(parts: Iterable[SspPart], stop_time: float | None) -> tuple[float, float]:
+    """Return default start and end of a simulation [s]: `stop_time`, or else the latest end.
+
+    Raise an ExportError if the end is not after the start.
+    """
     experiments = [part.description.defaultExperiment for part in parts]
     begins = [float(getattr(e, "startTime", None) or 0.0) for e in experiments]
     stops = [float(e.stopTime) for e in experiments if e is not None and e.stopTime is not None]
@@ -467,6 +514,7 @@ def _span(parts: Iterable[SspPart], stop_time: float | None) -> tuple[float, flo
 
 
 def _zip(files: Mapping[str, bytes]) -> bytes:
+    """Return a zip file of files by path; equal files give equal bytes."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:
         for file, content in files.items():

@@ -67,11 +67,14 @@ class StatusCheck:
 
 
 def check_of(model: Function, real: Real) -> StatusCheck | None:
-    """Return the conditions on the inputs of a model, or None if they only must be finite.
+    """Return the conditions on the inputs of a model, in addition to being finite.
 
     Args:
         model: any Function.
-        real: precision in which the model is evaluated.
+        real: type of numbers in which the model is evaluated, "double" or "float".
+
+    Returns:
+        The conditions; None if the inputs only have to be finite.
     """
     if not isinstance(model, ModelFunction):
         return None
@@ -93,11 +96,15 @@ def check_of(model: Function, real: Real) -> StatusCheck | None:
 
 
 def _holds(rows: Sequence[ValidityRow], real: Real) -> SX:
-    """Return whether each condition holds. A NaN residual violates its condition."""
+    """Return 1 or 0 for each condition (k, 1): whether it holds for numbers of the type `real`.
+
+    `rows` are the conditions. A NaN residual violates its condition.
+    """
     single = _SINGLE if real == "float" else {}
     values = [row.residual <= single.get(row.kind, row.bound) for row in rows]
     return casadi.vertcat(*values)
 
 
 def _column(value: SX, k: int) -> SX:
+    """Return column k of an input, or its last column if it has fewer columns."""
     return value[:, min(k, value.shape[1] - 1)]

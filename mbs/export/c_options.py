@@ -23,7 +23,7 @@ _REALS: tuple[Real, ...] = get_args(Real)
 
 @dataclass(frozen=True, kw_only=True)
 class CLibraryOptions:
-    """Options of a C library, for classes that have slots for them."""
+    """Options of a C library that its arguments and its internal settings share."""
 
     __slots__ = ()
 

@@ -189,7 +189,7 @@ def step_texts(system: System, name: str, library: str, real: Real, mark: str) -
         system: mechanism, open or closed, without rigid stops and Coulomb friction.
         name: name of the system in C.
         library: name of the library.
-        real: type of numbers.
+        real: type of numbers, "double" or "float".
         mark: text in the first line of generated files.
 
     Raises:
@@ -224,7 +224,7 @@ def step_texts(system: System, name: str, library: str, real: Real, mark: str) -
                 *_tables(system, state, variables, real),
                 "\n" + NOINLINE,
                 code,
-                *(_share(file) for file in ("closure.h", "closure.c", "watch.h", "watch.c")),
+                *(_shared_file(file) for file in ("closure.h", "closure.c", "watch.h", "watch.c")),
                 (resources.files("mbs.export") / "c" / "step.c").read_text(encoding="utf-8"),
             ]
         ),
@@ -240,7 +240,14 @@ def step_texts(system: System, name: str, library: str, real: Real, mark: str) -
 
 @dataclass(frozen=True, slots=True)
 class _Variables:
-    """Variables of the elements of x, z, u and p."""
+    """Descriptions of the elements of the vectors in C.
+
+    Attributes:
+        x: states of the independent joints.
+        z: positions that closed loops determine.
+        u: inputs.
+        p: parameters.
+    """
 
     x: tuple[FmuVariable, ...]
     z: tuple[FmuVariable, ...]
@@ -249,7 +256,10 @@ class _Variables:
 
 
 def _functions(system: System, state: MinimalState, variables: _Variables) -> list[Function]:
-    """Return the functions that step.c, closure.c and watch.c call, with dense arguments."""
+    """Return the Functions that step.c, closure.c and watch.c call, with dense arguments.
+
+    `state` gives the equations of motion in independent coordinates.
+    """
     sizes = [len(own) for own in (variables.x, variables.z, variables.u, variables.p)]
     t, (x, z, u, p) = MX.sym("t"), (MX.sym("s", size) for size in sizes)
     point = [t, x, z, u, p]
@@ -274,6 +284,10 @@ def _functions(system: System, state: MinimalState, variables: _Variables) -> li
 
 
 def _sizes(system: System, state: MinimalState, variables: _Variables, work: int) -> dict[str, int]:
+    """Return the C constants of sizes by name.
+
+    `work` is the number of elements of scratch memory that the functions need.
+    """
     nx, nz = len(variables.x), len(variables.z)
     return {
         "NX": nx,
@@ -304,6 +318,10 @@ def _quaternions(system: System, state: MinimalState) -> list[int]:
 def _header(
     system: System, variables: _Variables, sizes: dict[str, int], words: dict[str, str]
 ) -> str:
+    """Return the part of the library header that declares the simulation.
+
+    `sizes` are the C constants, `words` the names that the text template contains.
+    """
     speeds = system.speeds
     texts = {
         "x": _words((v.name, v.unit) for v in variables.x),
@@ -339,10 +357,15 @@ def _header(
 
 
 def _words(elements: Iterable[tuple[str, str]]) -> str:
+    """Return names with units as text, "none" if there are no elements."""
     return ", ".join(in_c_comment(f"{name} [{unit}]") for name, unit in elements) or "none"
 
 
 def _head(sizes: dict[str, int], words: dict[str, str], real: Real) -> str:
+    """Return the head of the C file: includes, types and sizes.
+
+    `sizes` are the C constants, `words` the names that the text template contains.
+    """
     watched = ""
     if sizes["NB"]:
         watched = f"#define WATCHED\ntypedef {words['name']}_watched watched;\n"
@@ -357,6 +380,7 @@ def _head(sizes: dict[str, int], words: dict[str, str], real: Real) -> str:
 
 
 def _tables(system: System, state: MinimalState, variables: _Variables, real: Real) -> list[str]:
+    """Return the C arrays of start values, bounds, scales and index tables, as C definitions."""
     joints = (*variables.x, *variables.z)
     every = list(outputs(system, state))
     first = len(state.accelerations) + len(state.shown)
@@ -387,16 +411,18 @@ def _tables(system: System, state: MinimalState, variables: _Variables, real: Re
 
 
 def _numbers(name: str, values: Iterable[float], real: Real) -> str:
+    """Return the C definition of a constant array `name` of numbers."""
     texts = [f"REAL({literal(float(value), real)})" for value in values] or ["REAL(0)"]
     return f"static const real {name}[] = {{{', '.join(texts)}}};"
 
 
 def _places(name: str, values: Sequence[int]) -> str:
+    """Return the C definition of a constant array `name` of indices."""
     return f"static const int {name}[] = {{{', '.join(map(str, values)) or '0'}}};"
 
 
-def _share(file: str) -> str:
-    """Return the text of a C file that FMUs use too, without #include lines."""
+def _shared_file(file: str) -> str:
+    """Return the text of a C file of the FMU runtime without #include lines."""
     folder = resources.files("mbs.export.fmu") / "c"
     lines = (folder / file).read_text(encoding="utf-8").splitlines()
     return "\n".join(line for line in lines if not line.startswith("#include")) + "\n"

@@ -149,7 +149,10 @@ def par(system: System | Mechanism, path: str | os.PathLike[str]) -> None:
 
 
 def system_of(system: object) -> System:
-    """Return the argument of a user as a System. A Mechanism is assembled.
+    """Return the argument of a user as a System; a Mechanism is assembled.
+
+    Args:
+        system: System or Mechanism.
 
     Raises:
         ModelError: the argument has another type.
@@ -164,7 +167,14 @@ def system_of(system: object) -> System:
 
 
 def shapes_left_out(system: System) -> str:
-    """Return the note about shapes, which no writer of robot files keeps; empty without shapes."""
+    """Return a note about the shapes of a system, which robot files do not contain.
+
+    Args:
+        system: mechanism to write.
+
+    Returns:
+        The note; empty if there are no shapes.
+    """
     if not system.shapes:
         return ""
     names = {-1: "the base", **{j: link.name for j, link in enumerate(system.tree.links)}}
@@ -173,7 +183,14 @@ def shapes_left_out(system: System) -> str:
 
 
 def mount_left_out(system: System) -> str:
-    """Return the note about a mount that a file in numbers cannot have; empty if it has it."""
+    """Return a note about a mount that the file does not contain.
+
+    Args:
+        system: mechanism to write.
+
+    Returns:
+        The note; empty without a mount, or if the mount has numeric values.
+    """
     lost = OUTER_WORLD in system.frames and base_pose(system) is None
     return (
         "The mount of the base has symbols without a value; it is not in this file." if lost else ""
@@ -184,7 +201,7 @@ def mount_left_out(system: System) -> str:
 
 
 def _check_urdf(system: System) -> None:
-    """Raise ModelError if URDF does not support a part of the system."""
+    """Raise a ModelError if URDF does not support a part of the system."""
 
     def fail(what: str) -> None:
         raise ModelError(f"{system.name}: {what}, which URDF cannot say; take it away first")
@@ -207,7 +224,7 @@ def _check_urdf(system: System) -> None:
 
 
 def _check_sdf(system: System) -> None:
-    """Raise ModelError if the format does not support a part of the system."""
+    """Raise a ModelError if SDF does not support a part of the system."""
     if system.parts or system.shafts:
         raise sdf_refusal(system.name, "it has force elements or a drive line")
     for link in system.tree.links:
@@ -224,6 +241,7 @@ def _check_sdf(system: System) -> None:
 
 
 def _check_sdf_loops(system: System) -> None:
+    """Raise a ModelError if SDF does not support a coupling or a joint that closes a loop."""
     driven = set()
     for coupling in system.couplings:
         if len(coupling.coefficients) > 2 or coupling.others:
@@ -242,7 +260,7 @@ def _check_sdf_loops(system: System) -> None:
 
 
 def _check_mjcf(system: System) -> None:
-    """Raise ModelError if the format does not support a part of the system."""
+    """Raise a ModelError if MJCF does not support a part of the system."""
     _check_backward_drives(system, "MJCF")
     for part in [*(row.name for row in system.shafts), *(row.name for row in system.devices)]:
         raise mjcf_refusal(
@@ -266,10 +284,10 @@ def _check_mjcf(system: System) -> None:
 
 
 def _check_backward_drives(system: System, file: str) -> None:
-    """Check free and spherical joints with the child body on frame_a for drives and friction.
+    """Raise a ModelError for drives or friction of joints whose child body is on frame_a.
 
-    Raises:
-        ModelError: friction or rotor inertia acts on velocities that the file does not have.
+    For these free and spherical joints the file has other velocities. `file` is the format, for the
+    error message.
     """
     for link in system.tree.links:
         acting = (link.Fv, link.Fs, link.Ia) if link.motion is Motion.FREE else (link.Fs,)

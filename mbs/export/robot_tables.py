@@ -51,9 +51,12 @@ from mbs.text import listed, quoted
 
 
 def base_pose(system: System) -> Array | None:
-    """Return the pose (4, 4) of the base in the outer world, symbols at their defaults.
+    """Return the pose (4, 4) of the base in the outer world, symbols at their default values.
 
-    None without a mount, and if one of its symbols has no value.
+    None without a mount, or if one of its symbols has no value.
+
+    Args:
+        system: mechanism to write.
     """
     if OUTER_WORLD not in system.frames:
         return None
@@ -87,7 +90,7 @@ def robot_table(system: System, file: str = ".par") -> RobotTable:
         ModelError: the format does not support a motion, coupling or force element.
     """
     _check_frames(system, file)
-    text = _text_function(system)
+    text = text_function(system)
     size = max(map(_length, _shifts(system)), default=0.0) or 1.0
     frames: list[FrameRow] = []
     number = {-1: 0}  # link index to frame index in the file; the base is frame 0
@@ -117,7 +120,7 @@ def robot_table(system: System, file: str = ".par") -> RobotTable:
             rows.append(FrameRow(before, sigma, motor_of_cut, **_geometry(own, text)))
     first, count = len(frames) + 1, len(system.cuts)
     loops = [
-        CutRow((first + k, first + count + k), _joint_kind(cut))
+        CutRow((first + k, first + count + k), cut.edge.joint.freedoms[0].motion.value)
         for k, cut in enumerate(system.cuts)
     ]
     names = [f"q{number[j]}" for j in range(len(system.tree.links))]
@@ -140,7 +143,7 @@ def robot_table(system: System, file: str = ".par") -> RobotTable:
 
 
 def _shifts(system: System) -> Iterator[SX]:
-    """Yield the origins [m] of links and cut joints in the frames of their antecedents."""
+    """Yield the origins (3, 1) [m] of links and cut joints in the frames of their antecedents."""
     defaults = SX(DM(system.p_default))
     for p in (
         *(link.pose().p for link in system.tree.links),
@@ -156,6 +159,7 @@ def _length(p: SX) -> float:
 
 
 def _check_frames(system: System, file: str) -> None:
+    """Raise a ModelError if a table of frames does not support a part of the system."""
     if system.parts:
         raise ModelError(
             f"{system.name}: force element {system.parts[0].name!r} cannot be said in a"
@@ -187,14 +191,12 @@ def _check_frames(system: System, file: str) -> None:
 
 
 def _geometry(placement: Khalil, text: Text) -> dict[str, Any]:
+    """Return the six Khalil parameters of a frame as texts, by name."""
     return dict(zip(GEOMETRY, map(text, placement.parameters), strict=True))
 
 
-def _joint_kind(cut: Cut) -> str:
-    return cut.edge.joint.freedoms[0].motion.value
-
-
 def _body(j: int, link: Link, text: Text) -> InertiaRow:
+    """Return the body row of frame j; inertia that no body can have is marked as grouped."""
     ten = link.inertia.parameters
     values: dict[str, Any] = {name: text(ten[k]) for k, name in enumerate(TEN_PARAMETERS)}
     values |= {name: text(getattr(link, name)) for name in _OF_THE_JOINT}
@@ -202,7 +204,14 @@ def _body(j: int, link: Link, text: Text) -> InertiaRow:
     return replace(row, grouped=False) if row.is_body else row
 
 
-def _text_function(system: System) -> Text:
+def text_function(system: System) -> Text:
+    """Return the function that writes a scalar expression of the symbols as text.
+
+    The text is in the grammar of mechanism files.
+
+    Args:
+        system: mechanism whose symbols the expressions contain.
+    """
     names = [parameter.name for parameter in system.parameters]
 
     def text(value: SX) -> str:
@@ -239,14 +248,18 @@ class Numbers:
         self.values = DM(system.parameter_values(parameters)) if system.parameters else DM(0, 1)
 
     def __call__(self, value: SX) -> Array:
-        """Evaluate an expression. Returns an array of its shape."""
+        """Return the numeric value of an expression as an array of its shape."""
         expression = casadi.densify(SX(value))
         if expression.is_constant():
             return np.array(DM(expression), dtype=float)
         return np.array(Function("value", [self.p], [expression])(self.values), dtype=float)
 
     def scalar(self, value: SX) -> float:
-        """Evaluate a scalar expression."""
+        """Return the numeric value of a scalar expression.
+
+        Args:
+            value: expression of the symbols of the system.
+        """
         return float(self(value).item())
 
 
@@ -271,7 +284,7 @@ def numbers_without_symbols(system: System, file: str) -> Numbers:
 
 
 class _Tables:
-    """Collector of the table of links of a system, as one format needs it.
+    """Collector of the table of links of a system; a subclass for each format.
 
     The formats differ in the frames of links (`body_of`), in the pose of the base and in the drawn
     positions.
@@ -280,8 +293,8 @@ class _Tables:
         system: mechanism to write.
         number: function that evaluates expressions.
         drawn: (nq,) joint positions at which the robot is drawn.
-        frames: frame of each link in the file, as its pose in the frame in the tree, by index (-1
-            for the base).
+        frames: pose of the frame of each link in the file relative to its frame in the tree, by
+            index (-1 for the base).
     """
 
     def __init__(self, system: System, number: Numbers, drawn: Sequence[float]) -> None:
@@ -290,7 +303,11 @@ class _Tables:
         self.frames: dict[int, Any] = {-1: self.pose(Pose.identity())}
 
     def table(self, hidden: Sequence[str] = ()) -> LinkTable:
-        """Return the table of links, without the frames with the names in `hidden`."""
+        """Return the table of links.
+
+        Args:
+            hidden: names of frames that are left out.
+        """
         system, number = self.system, self.number
         links = tuple(self._link(j, link) for j, link in enumerate(system.tree.links))
         return LinkTable(
@@ -321,11 +338,11 @@ class _Tables:
     # Rules of a format. Transforms are matrices (4, 4) of numbers, multiplied by NumPy.
 
     def pose(self, pose: Pose) -> Any:
-        """Return a pose as a transform."""
+        """Return a pose as a transform (4, 4)."""
         return self.number(pose.matrix)
 
     def inverse(self, T: Any) -> Any:
-        """Return the inverse of a transform."""
+        """Return the inverse of a transform (4, 4)."""
         return inverse(T)
 
     def matrix(self, T: Any) -> Array:
@@ -333,11 +350,17 @@ class _Tables:
         return np.asarray(T)
 
     def body_of(self, j: int, link: Link) -> str:
-        """Return the body whose frame is the frame of a link in the file; empty for none."""
+        """Return the name of the body whose frame is the frame of link j in the file.
+
+        Empty if the link has its frame in the tree. Subclasses implement it.
+        """
         raise NotImplementedError
 
-    def moved(self, j: int, link: Link) -> Any:
-        """Return the transform of the frame of a link in that of its antecedent, as drawn."""
+    def displacement(self, j: int, link: Link) -> Any:
+        """Return the transform of link j relative to its antecedent at the drawn positions.
+
+        Both frames are those in the tree.
+        """
         return self.pose(link.pose())
 
     def loop(self, cut: Cut) -> FileLoop:
@@ -347,6 +370,7 @@ class _Tables:
     # Rows of the table.
 
     def _link(self, j: int, link: Link) -> FileLink:
+        """Return the row of link j."""
         system, number = self.system, self.number
         body = self.body_of(j, link)
         own = self.pose(system.frames[body][1] if body else Pose.identity())
@@ -360,7 +384,7 @@ class _Tables:
             body=body,
             bodies=tuple(self._bodies(j)),
             frame=self.matrix(own),
-            placement=self.matrix(self.inverse(before) @ self.moved(j, link) @ own),
+            placement=self.matrix(self.inverse(before) @ self.displacement(j, link) @ own),
             joint_frame=self.matrix(self.inverse(own)),
             joint_pose=self.matrix(self.pose(link.pose())),
             inertia=number(link.inertia.parameters).ravel(),
@@ -381,13 +405,16 @@ class _Tables:
         return [row.name for row in self.system.bodies if row.link == j + 1]
 
     def _place(self, frame: Frame) -> Place:
+        """Return a frame as link index and pose (4, 4) relative to the file frame of the link."""
         number, pose = frame
         return number, self.matrix(self.inverse(self.frames[number]) @ self.pose(pose))
 
     def _pair(self, one: Frame, other: Frame) -> tuple[Place, Place]:
+        """Return the two coinciding frames of a loop as in `_place`."""
         return self._place(one), self._place(other)
 
     def _frame(self, name: str, place: Frame) -> FileFrame:
+        """Return the row of a frame with a name."""
         system = self.system
         number, pose = self._place(place)
         if name in system.named_frames:
@@ -398,6 +425,7 @@ class _Tables:
         return FileFrame(name, number, pose, "joint" if of_joint else "fixed")
 
     def _force(self, part: ComponentInstance) -> FileForce:
+        """Return the row of a force element with its numeric values."""
         element = part.element
         quantities: dict[str, tuple[Any, ...]] = {}
         levers: dict[str, float] = {}
@@ -465,7 +493,12 @@ class UrdfTables(_Tables):
         return super().table(hidden)
 
     def body_of(self, j: int, link: Link) -> str:
-        """Return the first body with its origin on the joint axis, or that of a free joint."""
+        """Return the first body of link j with its origin on the joint axis.
+
+        Empty without such a body.
+
+        For a free joint, the frame of the body must be that of the link in the tree.
+        """
         bodies = self._bodies(j)
         for name, (number, frame) in self.system.frames.items():
             if number == j and name in bodies:
@@ -494,12 +527,12 @@ class SdfTables(_Tables):
         self.in_world: dict[int, Array] = {-1: np.eye(4)}
 
     def body_of(self, j: int, link: Link) -> str:
-        """Return the first body of a link."""
+        """Return the first body of link j; empty if it has no body."""
         bodies = [name for name in self._bodies(j) if name in self.system.frames]
         return bodies[0] if bodies else ""
 
-    def moved(self, j: int, link: Link) -> Array:
-        """Return the transform of the frame of a link in that of its antecedent, as drawn."""
+    def displacement(self, j: int, link: Link) -> Array:
+        """Return the transform (4, 4) of link j relative to its antecedent, as drawn."""
         relative: Array = self.pose(link.pose()) @ self._motion(link)
         self.in_world[j] = self.in_world[link.antecedent] @ relative
         return relative
@@ -519,7 +552,7 @@ class SdfTables(_Tables):
         return inverse(T) if link.backward else T
 
     def loop(self, cut: Cut) -> FileLoop:
-        """Return the row of a joint that closes a loop. Its second place is not on the base."""
+        """Return the row of a joint that closes a loop; its second frame is not on the base."""
         turned = cut.frames[1][0] < 0
         (a, pose_a), (b, pose_b) = cut.frames[::-1] if turned else cut.frames
         at_a, at_b = self.pose(pose_a), self.pose(pose_b)
@@ -542,7 +575,7 @@ class MjcfTables(_Tables):
         self.symbols = dict(zip(names, casadi.vertsplit(system.p), strict=True))
 
     def pose(self, pose: Pose) -> Pose:
-        """Return the pose itself."""
+        """Return the pose itself, which is the transform of this class."""
         return pose
 
     def inverse(self, T: Pose) -> Pose:
@@ -556,7 +589,10 @@ class MjcfTables(_Tables):
         return found
 
     def body_of(self, j: int, link: Link) -> str:
-        """Return the first body of a link, if it may have the frame of the link in the file."""
+        """Return the first body of link j if its frame may be that of the link; empty otherwise.
+
+        The frame of a spherical or free joint must be the frame of the link in the tree.
+        """
         for name in self._bodies(j)[:1]:
             one_axis = link.motion in (Motion.REVOLUTE, Motion.PRISMATIC)
             if one_axis or is_identity(self.matrix(self.system.frames[name][1])):
@@ -564,7 +600,10 @@ class MjcfTables(_Tables):
         return ""
 
     def loop(self, cut: Cut) -> FileLoop:
-        """Return the row of a joint that closes a loop: two points of the axis of a revolute."""
+        """Return the row of a joint that closes a loop.
+
+        A revolute joint has two pairs of points on its axis.
+        """
         joint, (frame_a, frame_b) = cut.edge.joint, cut.frames
         if cut.welded:
             return super().loop(cut)
@@ -591,11 +630,15 @@ class MjcfTables(_Tables):
 
 
 def child_positions(system: System, q: Sequence[float]) -> list[float]:
-    """Return the positions q in the coordinates of robot files.
+    """Return the positions of a system in the coordinates of robot files.
 
-    In a robot file the quaternion of a joint is the orientation of the child body in the parent
-    body. In a system it is the orientation of frame_b in frame_a. Both differ if a spherical or
-    free joint has the child body on its frame_a.
+    In a robot file the quaternion of a joint is the orientation of the child body relative to the
+    parent body. In a system it is the orientation of frame_b relative to frame_a. Both differ if a
+    spherical or free joint has the child body on its frame_a.
+
+    Args:
+        system: mechanism to write.
+        q: (nq,) positions [rad or m].
     """
     found = [float(value) for value in q]
     for link, pose in zip(system.tree.links, link_poses(system.tree, SX(DM(found))), strict=True):

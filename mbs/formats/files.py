@@ -25,6 +25,9 @@ _MARKS = {
 def read_bytes(path: str | Path) -> bytes:
     """Return the content of a file.
 
+    Args:
+        path: path of the file.
+
     Raises:
         DescriptionError: the argument is not a path, the file does not exist or is not a regular
             file, it has more than `LARGEST_FILE` bytes, or it cannot be read.
@@ -57,7 +60,10 @@ def read_bytes(path: str | Path) -> bytes:
 def read_text(path: str | Path) -> str:
     """Return the text of a file, decoded by its byte-order mark or as UTF-8.
 
-    Invalid bytes are replaced.
+    Each invalid byte becomes the replacement character U+FFFD.
+
+    Args:
+        path: path of the file.
 
     Raises:
         DescriptionError: the errors of `read_bytes`.
@@ -66,7 +72,17 @@ def read_text(path: str | Path) -> str:
 
 
 def decoded(content: bytes, encoding: str = "utf-8") -> str:
-    """Decode a text by its byte-order mark, or else with `encoding`. Invalid bytes are replaced."""
+    """Decode bytes by their byte-order mark, or with `encoding` if there is no such mark.
+
+    Each invalid byte becomes the replacement character U+FFFD.
+
+    Args:
+        content: bytes of a text.
+        encoding: encoding of a text without byte-order mark.
+
+    Raises:
+        LookupError: `encoding` is unknown.
+    """
     for mark, name in _MARKS.items():
         if content.startswith(mark):
             return content.decode(name, errors="replace")
@@ -93,7 +109,7 @@ class Notes:
     taken: list[ImportNote] = field(default_factory=list)
 
     def add(self, kind: NoteKind, element: str, text: str, line: int | None = None) -> None:
-        """Add a note.
+        """Add a note; with `strict`, raise it as an error instead.
 
         Args:
             kind: kind of the note.

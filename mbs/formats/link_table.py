@@ -28,28 +28,32 @@ Place = tuple[int, Array]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FileLink:
-    """Link with its inertia, and the joint that moves it.
+    """Link with its inertia, and the joint that connects it to its antecedent (parent link).
+
+    The link has two frames. The tree frame is the frame of the link in the assembled tree, with the
+    joint axis along z. The file frame is the frame of the link in the file.
 
     Attributes:
         name: name of the joint.
         motion: motion of the joint.
-        antecedent: index of the link that carries the joint, -1 for the base.
-        body: name of the body whose frame is the frame of the link; empty for the frame in the
-            tree.
+        antecedent: index of the parent link, -1 for the base.
+        body: name of the body whose frame is the file frame; empty if the file frame is the tree
+            frame.
         bodies: names of all bodies on the link.
-        frame: (4, 4) pose of the frame of the link in the frame in the tree.
-        placement: (4, 4) pose of the frame of the link in the frame of the antecedent, at the drawn
-            joint positions.
-        joint_frame: (4, 4) pose of the frame of the joint in the frame of the link.
-        joint_pose: (4, 4) pose of the frame in the tree in that of the antecedent, at position
-            zero.
-        inertia: (10,) inertial parameters XX XY XZ YY YZ ZZ MX MY MZ M in the frame in the tree.
+        frame: (4, 4) pose of the file frame relative to the tree frame.
+        placement: (4, 4) pose of the file frame relative to the file frame of the antecedent, at
+            the drawn joint positions.
+        joint_frame: (4, 4) pose of the joint frame relative to the file frame.
+        joint_pose: (4, 4) pose of the tree frame relative to the tree frame of the antecedent, at
+            position zero.
+        inertia: (10,) inertial parameters XX XY XZ YY YZ ZZ MX MY MZ M in the tree frame.
         Fv, Fs: viscous and Coulomb friction of the joint.
         Ia: rotor inertia, referred to the joint.
         stiffness, rest: stiffness and rest position of the spring of the joint.
-        limits, velocity, effort: limits of position, velocity and motor effort; None if unlimited.
+        limits, velocity, effort: limits (lower, upper) of position, velocity and motor effort; None
+            if unlimited.
         actuated: whether a motor drives the joint.
-        position: index of the first position of the joint.
+        position: index of the first position of the joint in the vector of joint positions.
     """
 
     name: str
@@ -81,8 +85,9 @@ class FileFrame:
     Attributes:
         name: name of the frame.
         link: index of the link, -1 for the base.
-        pose: (4, 4) pose in the frame of the link.
-        kind: "named", "body", "joint" or "fixed".
+        pose: (4, 4) pose relative to the file frame of the link.
+        kind: origin of the frame: "named" (frame named by the user), "body", "joint", or "fixed"
+            (body fixed to the base).
     """
 
     name: str
@@ -93,13 +98,13 @@ class FileFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FileCoupling:
-    """Relation driven = sum of c_k driver^k + sum of further positions times factors.
+    """Coupling of joint positions: driven = c_0 + c_1 driver + c_2 driver^2 + ... + linear terms.
 
     Attributes:
         name: name of the coupling.
-        driven, driver: indices of positions.
-        coefficients: c_0, c_1, ...
-        others: index and factor of each further position.
+        driven, driver: indices of the driven and the driving joint position.
+        coefficients: c_0, c_1, ... of the polynomial in the driving position.
+        others: index and factor of each further joint position that is added.
     """
 
     name: str
@@ -115,10 +120,12 @@ class FileLoop:
 
     Attributes:
         joint: description of the joint.
-        welded: whether the joint itself is in the tree, and a weld closes the loop.
-        ends: pairs of places that coincide in a closed loop; for a rod its ends.
-        turned: whether the first place of a pair is that of frame_b of the joint.
-        opening: (4, 4) pose of the second place relative to the first one, as drawn.
+        welded: whether the joint itself is in the tree and a weld closes the loop instead.
+        ends: pairs of frames, given by link index and pose, that coincide if the loop is closed;
+            for a rod the frames of its two ends.
+        turned: whether the first frame of a pair belongs to frame_b of the joint instead of
+            frame_a.
+        opening: (4, 4) pose of the second frame relative to the first frame at the drawn positions.
         excess: length of a rod minus the distance of its ends at position zero [m].
     """
 
@@ -132,13 +139,13 @@ class FileLoop:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FileForce:
-    """Force element.
+    """Force element of the robot, such as a spring, a damper or a fixed tendon.
 
     Attributes:
         element: description of the element.
-        values: its quantities in numbers, by name.
-        places: places of its points.
-        levers: names of the velocities on which it acts, and its moment arms.
+        values: numeric values of its quantities, by name.
+        places: frames of its attachment points, given by link index and pose.
+        levers: moment arms of the element, by the name of the joint velocity on which it acts.
     """
 
     element: Custom
@@ -149,7 +156,7 @@ class FileForce:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkTable:
-    """Robot as tables of numbers.
+    """Robot as tables of numbers, from which URDF, SDF and MJCF files are written.
 
     Attributes:
         name: name of the robot.
@@ -157,8 +164,9 @@ class LinkTable:
         links: links in an order in which antecedents precede their descendants.
         frames: frames on the links and on the base, by name.
         positions: names of the joint positions.
-        drawn: (nq,) joint positions at which the robot is drawn.
-        couplings: relations between joint positions.
+        drawn: (nq,) joint positions of the pictures, at which `FileLink.placement` is evaluated
+            [rad or m].
+        couplings: couplings of joint positions.
         loops: joints that close loops.
         forces: force elements.
     """
@@ -177,22 +185,38 @@ class LinkTable:
 # Rules of the formats with one inertia about the centre of mass and one limit per direction.
 
 
+def central_inertia(inertia: Array) -> tuple[float, Array, Array]:
+    """Return mass, centre of mass (3,) and inertia about it (3, 3) from inertial parameters.
+
+    The centre of mass of a massless body is the origin.
+
+    Args:
+        inertia: (10,) inertial parameters XX XY XZ YY YZ ZZ MX MY MZ M about the origin.
+    """
+    J = inertia[[0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(3, 3)
+    mass = float(inertia[9])
+    c = inertia[6:9] / mass if mass else np.zeros(3)
+    return mass, c, J - mass * (c @ c * np.eye(3) - np.outer(c, c))
+
+
 def inertial_of(table: LinkTable, link: FileLink) -> tuple[float, Array, Array]:
-    """Return mass, centre of mass (3,) and inertia about it (3, 3), in the frame of a link.
+    """Return mass [kg], centre of mass (3,) [m] and inertia about it (3, 3) [kg m^2] of a link.
+
+    Centre of mass and inertia are expressed in the file frame of the link (see `FileLink`).
+
+    Args:
+        table: tables of the robot; only its name is used, for the error message.
+        link: link of the tables.
 
     Raises:
         ModelError: the link has first moments but no mass.
     """
-    ten = link.inertia
-    J = ten[[0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(3, 3)
-    mass, moment = float(ten[9]), ten[6:9]
-    if mass == 0 and np.any(moment):
+    mass, c, J = central_inertia(link.inertia)
+    if mass == 0 and np.any(link.inertia[6:9]):
         raise ModelError(
             f"{table.name}: what {link.name} carries has first moments but no mass, which no robot"
             " file can say; give it a mass"
         )
-    c = moment / mass if mass else np.zeros(3)
-    J = J - mass * (c @ c * np.eye(3) - np.outer(c, c))
     R, p = link.frame[:3, :3], link.frame[:3, 3]
     return mass, R.T @ (c - p), R.T @ J @ R
 
@@ -200,13 +224,17 @@ def inertial_of(table: LinkTable, link: FileLink) -> tuple[float, Array, Array]:
 def largest_of(
     table: LinkTable, link: FileLink, file: str, unlimited: float
 ) -> tuple[float, float]:
-    """Return the limits of the velocity and of the effort of a joint, for both directions.
+    """Return the velocity limit and the effort limit of a joint, each valid for both directions.
 
     Args:
-        table: tables of the robot.
+        table: tables of the robot; only its name is used, for the error message.
         link: link that the joint moves.
-        file: kind of file, for error messages.
-        unlimited: number for a limit that does not exist.
+        file: name of the file format, for the error message.
+        unlimited: number that the format uses for a missing limit.
+
+    Returns:
+        (velocity, effort) in [rad/s or m/s] and [N m or N]. Both are `unlimited` for spherical and
+        free joints.
 
     Raises:
         ModelError: a velocity or effort limit differs by direction.

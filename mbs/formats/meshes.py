@@ -57,7 +57,11 @@ class MeshFiles:
         return found
 
     def note(self, notes: Notes) -> None:
-        """Add one note on all missing meshes."""
+        """Add one import note that lists the missing meshes; do nothing if all were found.
+
+        Args:
+            notes: notes of the robot file.
+        """
         if not self.missing:
             return
         first, line = next(iter(self.missing.items()))
@@ -73,6 +77,12 @@ class MeshFiles:
         notes.add("ignored", "a mesh", f"{what} not drawn: {why}", line)
 
     def _candidates(self, name: str, folder: Path) -> list[Path]:
+        """Return the paths at which a mesh may be, in the order of the search.
+
+        Args:
+            name: name of the mesh in the description, as for `find`.
+            folder: folder of relative paths.
+        """
         package = _PACKAGE.fullmatch(name)
         if package is not None:
             inside = package[2]
@@ -88,7 +98,10 @@ class MeshFiles:
         return [folder / name.replace("\\", "/")]
 
     def _package(self, name: str, folder: Path) -> list[Path]:
-        """Return the folders that may contain the package of this name."""
+        """Return the existing folders that may contain the package `name`, in search order.
+
+        `folder` is the folder of the description, whose parent folders are searched.
+        """
         if name not in self.folders:
             found = [Path(self.packages[name])] if name in self.packages else []
             if not found and name not in (".", ".."):
@@ -103,6 +116,6 @@ class MeshFiles:
 
 
 def _within(folder: Path, name: str) -> Path | None:
-    """Return the path of a file in a folder; None if the path is outside the folder."""
+    """Return the path of the file `name` in a folder; None if the path leaves the folder."""
     path = Path(os.path.normpath(folder / name))
     return path if path.is_relative_to(os.path.normpath(folder)) else None

@@ -124,14 +124,20 @@ class ParFile:
 
     @staticmethod
     def of(path: str, text: str) -> ParFile:
-        """Parse the text of a file.
+        """Parse the text of a .par file.
+
+        Args:
+            path: path of the file, for error messages.
+            text: content of the file.
 
         Raises:
             DescriptionError: a line cannot be read, or its key is misspelt or given twice.
         """
         lines, comments = _without_comments(text)
         entries, remarks = _entries(path, lines), _line_remarks(path, comments)
-        said = [_say(comment) for _, comment in reversed(comments)]  # first of a kind counts
+        said = [
+            _key_and_value(comment) for _, comment in reversed(comments)
+        ]  # first of a kind counts
         quotes = {key: value[1:] for key, value in said if value[:1] == "'"}
         name, closed, _ = quotes.get("Robotname", "").partition("'")
         source = quotes.get("Source", "")
@@ -144,11 +150,24 @@ class ParFile:
         )
 
     def where(self, key: str) -> str:
-        """File, line and key, for error messages."""
+        """Return file, line and key for error messages; the file alone if the key is missing.
+
+        Args:
+            key: key of the file, such as "theta".
+        """
         return f"{self.path}:{self.entries[key][0]}: {key}" if key in self.entries else self.path
 
     def vector(self, key: str, length: int, per: str) -> tuple[str, ...] | None:
-        """Return the values of a key, or None if the file does not contain it."""
+        """Return the values of a key as texts, or None if the file does not contain the key.
+
+        Args:
+            key: key of a vector.
+            length: required number of values.
+            per: element of the robot that has one value each, for the error message.
+
+        Raises:
+            DescriptionError: the number of values is not `length`.
+        """
         if key not in self.entries:
             return None
         values = self.entries[key][1]
@@ -159,11 +178,26 @@ class ParFile:
         return values
 
     def integer(self, key: str, text: str) -> int:
-        """Convert a value of a key to an integer."""
+        """Return the text of a value as an integer.
+
+        Args:
+            key: key of the value, for the error message.
+            text: text of the value.
+
+        Raises:
+            DescriptionError: the text is not an integer.
+        """
         return whole_number(text, self.where(key))
 
     def count(self, key: str) -> int:
-        """Return the number of links, joints or frames."""
+        """Return the number of links, joints or frames.
+
+        Args:
+            key: NL (links), NJ (joints) or NF (frames).
+
+        Raises:
+            DescriptionError: the key is missing, or its value is not an integer from 1 to 1000.
+        """
         if key not in self.entries:
             raise DescriptionError(f"{self.path}: {key} is missing; add a line {key} = <number>")
         values = self.vector(key, 1, "robot")
@@ -173,13 +207,24 @@ class ParFile:
         return count
 
     def remarked(self, kind: str) -> Iterator[tuple[str, str, str]]:
-        """Yield the location, name and text of every comment of a kind."""
+        """Yield (location for error messages, name, text) of every data comment of a kind.
+
+        Args:
+            kind: "Value", "Guess", "Fs_width", "rest" or "grouped".
+        """
         for (found, name), (line, text) in self.remarks.items():
             if found == kind:
                 yield f"{self.path}:{line}: {kind} {name}", name, text
 
     def numbers(self, kind: str) -> dict[str, float]:
-        """Return the comments of a kind as numbers, by name."""
+        """Return the values of all data comments of a kind as numbers, by name.
+
+        Args:
+            kind: "Value" or "Guess".
+
+        Raises:
+            DescriptionError: a value is not a number.
+        """
         return {name: number(text, where) for where, name, text in self.remarked(kind)}
 
 
@@ -198,13 +243,17 @@ def _without_comments(text: str) -> tuple[list[str], list[tuple[int, str]]]:
     return "".join(kept).splitlines(), comments
 
 
-def _say(comment: str) -> tuple[str, str]:
-    """Split a comment such as `Source = 'a book'` into key and value."""
+def _key_and_value(comment: str) -> tuple[str, str]:
+    """Split a comment such as `Source = 'a book'` at the first "=" into key and value."""
     key, _, value = comment.partition("=")
     return " ".join(key.split()), value.strip()
 
 
 def _entries(path: str, lines: list[str]) -> dict[str, tuple[int, tuple[str, ...]]]:
+    """Return the assignments in lines without comments: key -> (line number, texts of the values).
+
+    Raise a DescriptionError if a line is not an assignment or a key is given twice.
+    """
     entries: dict[str, tuple[int, tuple[str, ...]]] = {}
     number = 0
     while number < len(lines):
@@ -226,9 +275,13 @@ def _entries(path: str, lines: list[str]) -> dict[str, tuple[int, tuple[str, ...
 def _line_remarks(
     path: str, comments: list[tuple[int, str]]
 ) -> dict[tuple[str, str], tuple[int, str]]:
+    """Return the comments that contain data: (kind, name) -> (line number, text of the value).
+
+    `comments` are (line number, text). Raise a DescriptionError if a datum is given twice.
+    """
     remarks: dict[tuple[str, str], tuple[int, str]] = {}
     for line, comment in comments:
-        key, value = _say(comment)
+        key, value = _key_and_value(comment)
         kind, _, name = key.partition(" ")
         if kind not in _REMARKS or not _REMARKED.fullmatch(name) or "=" not in comment:
             continue
@@ -244,6 +297,10 @@ def _line_remarks(
 
 
 def _assignment(where: str, line: str) -> tuple[str, tuple[str, ...]]:
+    """Split an assignment into its key, in the present spelling, and the texts of its values.
+
+    Raise a DescriptionError that begins with `where` if the line is not an assignment.
+    """
     match = _ASSIGNMENT.fullmatch(line)
     value = match[2].strip() if match else ""
     braces = (value[:1], value[-1:])
@@ -258,7 +315,7 @@ def _assignment(where: str, line: str) -> tuple[str, tuple[str, ...]]:
 
 
 def _split(text: str) -> tuple[str, ...]:
-    """Split a text at the commas outside parentheses."""
+    """Split a text at the commas outside parentheses, and join the blanks inside each part."""
     depth, start, parts = 0, 0, []
     for k, letter in enumerate(text):
         depth += (letter == "(") - (letter == ")")
@@ -269,7 +326,10 @@ def _split(text: str) -> tuple[str, ...]:
 
 
 def _check_spelling(where: str, key: str) -> None:
-    """Raise if a key is similar to a known key. Other unknown keys are ignored."""
+    """Raise a DescriptionError if a key is similar to a known key.
+
+    Other unknown keys are allowed.
+    """
     if key in _KNOWN:
         return
     folded = {known.casefold() for known in _KNOWN}
@@ -306,6 +366,9 @@ def split_variable(where: str, value: Expression, j: int, sigma: int) -> tuple[s
         j: number of the frame.
         sigma: 0 revolute, 1 prismatic.
 
+    Returns:
+        Name of the variable, and the constant that is added to it.
+
     Raises:
         DescriptionError: there is no variable, or the expression is not the variable plus a
             constant.
@@ -327,6 +390,11 @@ def split_variable(where: str, value: Expression, j: int, sigma: int) -> tuple[s
 
 
 def _variable(where: str, value: Expression, j: int, sigma: int) -> str:
+    """Return the name of the joint variable of frame j in the expression `value`.
+
+    The rule is that of `split_variable`; sigma is 0 (revolute) or 1 (prismatic). Raise a
+    DescriptionError if no symbol, or more than one, is a candidate.
+    """
     names = list(dict.fromkeys(p.name for p in parameters_of(value)))
     if len(names) == 1:
         return names[0]
@@ -342,7 +410,7 @@ def _variable(where: str, value: Expression, j: int, sigma: int) -> str:
 
 
 def _terms(value: Expression, variable: str, sign: int = 1) -> Iterator[tuple[int, Expression]]:
-    """Yield the signed terms of a sum, with the variable as a separate term."""
+    """Yield the terms of a sum as (sign, term); terms with the variable are split completely."""
     if isinstance(value, Operation) and value.operator in ("+", "-"):
         left, right = value.arguments
         other = sign if value.operator == "+" else -sign
@@ -358,6 +426,7 @@ def _terms(value: Expression, variable: str, sign: int = 1) -> Iterator[tuple[in
 
 
 def _add(rest: Expression | None, sign: int, term: Expression) -> Expression:
+    """Return rest + sign term; `rest` is None for an empty sum."""
     if rest is None:
         return term if sign > 0 else -term
     return rest + term if sign > 0 else rest - term
@@ -371,7 +440,8 @@ def read_par(path: str | Path, parameters: Mapping[str, float] | None = None) ->
 
     Args:
         path: path of the file.
-        parameters: values of symbols in the file. Other symbols have no value.
+        parameters: values of symbols, which override values in the file. Other symbols have no
+            value.
 
     Raises:
         DescriptionError: a line cannot be read, a key is misspelt, a vector has the wrong length,
@@ -396,6 +466,7 @@ def read_par(path: str | Path, parameters: Mapping[str, float] | None = None) ->
 
 
 def _check_kind(file: ParFile, NL: int, NJ: int) -> None:
+    """Raise a DescriptionError if NF or Type contradicts NL and NJ, or if the base moves."""
     if NJ < NL:
         raise DescriptionError(f"{file.where('NJ')} is {NJ}, below NL = {NL}; give NJ >= NL")
     if "NF" in file.entries and file.count("NF") != 2 * NJ - NL:
@@ -419,6 +490,10 @@ def _check_kind(file: ParFile, NL: int, NJ: int) -> None:
 
 
 def _frames(file: ParFile, NF: int, closed: bool) -> tuple[FrameRow, ...]:
+    """Return the NF frame rows of a file; `closed` is True if the robot has closed loops.
+
+    Raise a DescriptionError if `ant` or `sigma` is missing or two joints have the same variable.
+    """
     columns = {key: file.vector(key, NF, "frame") for key in FRAME_KEYS}
     for key in ("ant", "sigma"):
         if columns[key] is None:
@@ -443,6 +518,10 @@ def _frames(file: ParFile, NF: int, closed: bool) -> tuple[FrameRow, ...]:
 def _frame(
     file: ParFile, j: int, texts: Mapping[str, str], closed: bool
 ) -> tuple[FrameRow, str | None]:
+    """Return the row of frame j and the name of its joint variable (None for a fixed frame).
+
+    `texts` are the values of the frame by key, `closed` is True for a robot with closed loops.
+    """
     sigma = file.integer("sigma", texts["sigma"])
     values: dict[str, Any] = {
         key: expression(texts[key], f"{file.where(key)} of frame {j}")
@@ -465,6 +544,10 @@ def _frame(
 
 
 def _check_variables(file: ParFile, rows: tuple[FrameRow, ...], taken: Mapping[str, int]) -> None:
+    """Raise a DescriptionError if a geometric parameter depends on a joint variable.
+
+    `taken` gives the frame of each joint variable.
+    """
     for j, row in enumerate(rows, 1):
         for key, value in row.geometry.items():
             for symbol in parameters_of(expression(value)):
@@ -478,6 +561,10 @@ def _check_variables(file: ParFile, rows: tuple[FrameRow, ...], taken: Mapping[s
 def _bodies(
     file: ParFile, NL: int, NJ: int, frames: tuple[FrameRow, ...]
 ) -> tuple[InertiaRow, ...]:
+    """Return the body rows of a file with NL links and NJ joints.
+
+    They contain the inertia of links, and the drive, spring and friction width of joints.
+    """
     remarks = {kind: _remarks(file, kind, NJ) for kind in _OF_JOINTS}
     springs, grouped = _springs(file, NJ, frames), _remarks(file, "grouped", NJ)
     rows = []
@@ -493,7 +580,10 @@ def _bodies(
 
 
 def _springs(file: ParFile, NJ: int, frames: tuple[FrameRow, ...]) -> dict[int, Expression]:
-    """Return the stiffness of the joints that are flexible according to eta."""
+    """Return the spring stiffness of the flexible joints (eta = 1) by joint number, from 1 to NJ.
+
+    Raise a DescriptionError if eta is invalid or a fixed frame is flexible.
+    """
     eta = file.vector(FLEXIBLE, NJ, "joint") or ()
     stiffness = file.vector(STIFFNESS, NJ, "joint")
     springs: dict[int, Expression] = {}
@@ -511,6 +601,10 @@ def _springs(file: ParFile, NJ: int, frames: tuple[FrameRow, ...]) -> dict[int, 
 
 
 def _body(file: ParFile, j: int, NL: int, *, fixed: bool) -> dict[str, Any]:
+    """Return inertial and drive parameters of link j by name; `fixed` is True for sigma = 2.
+
+    A missing vector gives symbols, such as XX3.
+    """
     values: dict[str, Any] = {}
     for key, name in BODY_KEYS.items():
         column = file.vector(key, NL, "link")
@@ -521,7 +615,10 @@ def _body(file: ParFile, j: int, NL: int, *, fixed: bool) -> dict[str, Any]:
 
 
 def _remarks(file: ParFile, kind: str, NJ: int) -> dict[int, Expression]:
-    """Return the expressions in comments of a kind, by joint number."""
+    """Return the expressions in data comments of a kind, such as "rest", by joint number.
+
+    Raise a DescriptionError if a number is not between 1 and NJ.
+    """
     values: dict[int, Expression] = {}
     for where, name, text in file.remarked(kind):
         if not name.isdecimal() or not 1 <= int(name) <= NJ:
@@ -531,16 +628,22 @@ def _remarks(file: ParFile, kind: str, NJ: int) -> dict[int, Expression]:
 
 
 def _loop(moving: int, fixed: int, frames: tuple[FrameRow, ...]) -> CutRow:
+    """Return the cut of a loop between the frames with the numbers `moving` and `fixed`."""
     prismatic = frames[moving - 1].sigma == 1
     return CutRow((moving, fixed), "prismatic" if prismatic else "revolute")
 
 
 def _gravity(file: ParFile) -> tuple[Expression, ...]:
+    """Return the gravity of a file in the base frame; by default along z, with the symbol GZ."""
     texts = file.vector("G", 3, "axis") or ("0", "0", "GZ")
     return tuple(expression(text, file.where("G")) for text in texts)
 
 
 def _extras(file: ParFile, NL: int, NJ: int) -> dict[str, tuple[str, ...]]:
+    """Return the vectors that are only kept for writing, as texts by key.
+
+    NL and NJ are the numbers of links and joints, which give the lengths of the vectors.
+    """
     lengths = {
         **dict.fromkeys(LINK_EXTRAS, NL),
         **dict.fromkeys(JOINT_EXTRAS, NJ),
@@ -581,6 +684,10 @@ def write_par(table: RobotTable, path: str | Path, *, note: str = "") -> None:
 
 
 def _lines(table: RobotTable, note: str) -> Iterator[str]:
+    """Yield the lines of the .par file of a table; `note` is written as a comment.
+
+    Raise a DescriptionError if the format cannot express a part of the table.
+    """
     NF, B = len(table.frames), len(table.loops)
     NL, NJ = NF - 2 * B, NF - B
     _check_loops(table, NL, NJ)
@@ -615,7 +722,7 @@ def _lines(table: RobotTable, note: str) -> Iterator[str]:
 
 
 def _remark_lines(table: RobotTable, NJ: int) -> Iterator[str]:
-    """Yield comments for data that have no key in the format."""
+    """Yield comments with the data that have no key in the format; joints are 1 to NJ."""
     numbers = {table.joint_name(j): j for j in range(1, len(table.frames) + 1)}
     yield from (f"(* Value {name} = {value!r} *)" for name, value in table.parameters.items())
     yield from (f"(* Guess q{numbers[name]} = {value!r} *)" for name, value in table.guess.items())
@@ -629,6 +736,7 @@ def _remark_lines(table: RobotTable, NJ: int) -> Iterator[str]:
 
 
 def _spring_lines(table: RobotTable, NJ: int) -> Iterator[str]:
+    """Yield the lines of the vectors eta and k; none if no joint has a spring."""
     stiffness = ["0"] * NJ
     for row in table.bodies:
         if "stiffness" in row.drive:
@@ -639,7 +747,10 @@ def _spring_lines(table: RobotTable, NJ: int) -> Iterator[str]:
 
 
 def _motors(table: RobotTable) -> Iterator[int]:
-    """Yield 1 for actuated frames, else 0. By default, joints inside loops are passive."""
+    """Yield 1 for each frame with an actuated joint, else 0.
+
+    By default, joints in loops are passive.
+    """
     passive = set(table.cut_frames)
     for loop in table.loops:
         moving, fixed = (_path(table, frame) for frame in loop.cut)
@@ -650,7 +761,7 @@ def _motors(table: RobotTable) -> Iterator[int]:
 
 
 def _path(table: RobotTable, frame: int) -> set[int]:
-    """Return the frames on the path from the base to this frame."""
+    """Return the numbers of a frame and of all its antecedents, without the base."""
     path: set[int] = set()
     while frame:
         path.add(frame)
@@ -659,12 +770,14 @@ def _path(table: RobotTable, frame: int) -> set[int]:
 
 
 def _kind(table: RobotTable) -> int:
+    """Return the key Type: 0 serial chain, 1 tree, 2 closed loops."""
     if table.loops:
         return 2
     return int(any(row.antecedent != j for j, row in enumerate(table.frames)))
 
 
 def _cell(key: str, j: int, row: FrameRow) -> str:
+    """Return geometric parameter `key` of frame j as text, with the joint variable it contains."""
     text = _text(getattr(row, key))
     if key != _VARIED.get(row.sigma):
         return text
@@ -675,20 +788,27 @@ def _cell(key: str, j: int, row: FrameRow) -> str:
 
 
 def _text(value: Scalar) -> str:
+    """Return a number or expression as text in the syntax of the format."""
     return str(expression(value)).replace("^", "**")
 
 
 def _vector(key: str, values: Iterable[object]) -> str:
+    """Return the line `key = {value, ...}`."""
     return f"{key} = {{{','.join(map(str, values))}}}"
 
 
 def _extra_lines(table: RobotTable, keys: Iterable[str]) -> Iterator[str]:
+    """Yield the lines of the given keys that the table keeps as extra data."""
     for key in keys:
         if key in table.extras:
             yield _vector(key, (_text(text) for text in table.extras[key]))
 
 
 def _check_loops(table: RobotTable, NL: int, NJ: int) -> None:
+    """Raise a DescriptionError if the format does not support a loop of the table.
+
+    It needs revolute or prismatic cut joints, and loop k cut between the frames NL + k and NJ + k.
+    """
     for k, loop in enumerate(table.loops, 1):
         if loop.joint not in ("revolute", "prismatic"):
             raise DescriptionError(
@@ -702,6 +822,7 @@ def _check_loops(table: RobotTable, NL: int, NJ: int) -> None:
 
 
 def _check_drives(table: RobotTable, NL: int) -> None:
+    """Raise a DescriptionError for rotors, and for the drive of a cut joint (frame above NL)."""
     for row in table.bodies:
         where = f"{table.name}/body {row.frame}"
         if row.rotor is not None:
@@ -715,6 +836,7 @@ def _check_drives(table: RobotTable, NL: int) -> None:
 
 
 def _check_symbols(table: RobotTable) -> None:
+    """Raise a DescriptionError if a symbol has the name of a joint variable of the written file."""
     variables = {
         f"{_SHORT[row.sigma]}{j}" for j, row in enumerate(table.frames, 1) if row.sigma != 2
     }

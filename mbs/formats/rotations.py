@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 def transform(R: Any, p: Any) -> Array:
-    """Return the homogeneous transform (4, 4) of a rotation (3, 3) and a displacement (3,)."""
+    """Return the homogeneous transform (4, 4) of a rotation R (3, 3) and a displacement p (3,)."""
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = R, p
     return T
@@ -25,8 +25,18 @@ def inverse(T: Array) -> Array:
     return np.block([[R.T, -(R.T @ p)[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
 
 
+def axis_rotation(axis: int, angle: float) -> Array:
+    """Return the rotation matrix (3, 3) about coordinate axis 0, 1 or 2 by an angle [rad]."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    R = np.eye(3)
+    R[i, i] = R[j, j] = math.cos(angle)
+    R[j, i] = math.sin(angle)
+    R[i, j] = -R[j, i]
+    return R
+
+
 def matrix_of_angles(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the rotation (3, 3) by roll, pitch and yaw [rad] about the fixed axes x, y and z."""
+    """Return the rotation matrix Rz(yaw) Ry(pitch) Rx(roll) (3, 3); angles in [rad]."""
     (a, b, c), (x, y, z) = map(math.cos, (roll, pitch, yaw)), map(math.sin, (roll, pitch, yaw))
     return np.array(
         [
@@ -38,9 +48,10 @@ def matrix_of_angles(roll: float, pitch: float, yaw: float) -> Array:
 
 
 def angles_of(R: Array) -> tuple[float, float, float]:
-    """Return roll, pitch and yaw [rad] of a rotation matrix, accurate also at pitch +-pi/2.
+    """Return (roll, pitch, yaw) [rad] of a rotation matrix R = Rz(yaw) Ry(pitch) Rx(roll) (3, 3).
 
-    Yaw is arbitrary at pitch +-pi/2; roll and pitch are computed for the chosen yaw.
+    The angles are accurate also at pitch +-pi/2, where yaw is arbitrary; roll and pitch are
+    computed for the chosen yaw.
     """
     yaw = math.atan2(R[1, 0], R[0, 0])
     c, s = math.cos(yaw), math.sin(yaw)
@@ -64,7 +75,7 @@ def matrix_of_quaternion(quaternion: Sequence[float]) -> Array:
 def quaternion_of(R: Array) -> Array:
     """Return the unit quaternion (w, x, y, z) of a rotation matrix (3, 3).
 
-    It is computed from its largest element. Source: Shepperd 1978.
+    It is computed from its element of largest magnitude. Source: Shepperd 1978.
     """
     trace = float(np.trace(R))
     squares = np.array([trace, R[0, 0], R[1, 1], R[2, 2]])

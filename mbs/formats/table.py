@@ -202,6 +202,10 @@ class RobotTable:
     extras: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        """Check the rows and convert their values.
+
+        Raise a DescriptionError if they are inconsistent.
+        """
         if not isinstance(self.name, str) or not self.name.strip():
             raise DescriptionError(f"robot {self.name!r}: the name is not a text; give it a name")
         if not self.frames:
@@ -214,11 +218,15 @@ class RobotTable:
         )
         gravity = _gravity(self.name, self.gravity)
         values = _values(self.name, self.parameters, (frames, bodies, gravity))
-        object.__setattr__(self, "frames", tuple(_bare(row, GEOMETRY) for row in frames))
-        object.__setattr__(self, "loops", tuple(map(_plain_cut, self.loops)))
-        object.__setattr__(self, "bodies", tuple(_bare(row, BODY_SCALARS) for row in bodies))
-        object.__setattr__(self, "gravity", tuple(expression(str(g)) for g in gravity))
-        object.__setattr__(self, "parameters", values)
+        checked = {
+            "frames": tuple(_bare(row, GEOMETRY) for row in frames),
+            "loops": tuple(map(_plain_cut, self.loops)),
+            "bodies": tuple(_bare(row, BODY_SCALARS) for row in bodies),
+            "gravity": tuple(expression(str(g)) for g in gravity),
+            "parameters": values,
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
         _check_bodies(self)
         _check_loops(self)
         object.__setattr__(self, "guess", _guess(self))
@@ -235,12 +243,19 @@ class RobotTable:
         return frozenset(symbol.name for scalar in scalars for symbol in parameters_of(scalar))
 
     def joint_name(self, j: int) -> str:
-        """Return the name of the joint of frame j."""
+        """Return the name of a joint: the name in its row, or q<j>.
+
+        Args:
+            j: number of the frame that the joint moves, from 1.
+        """
         return self.frames[j - 1].name or f"q{j}"
 
 
 def require_table(table: object) -> None:
-    """Raise if the argument is not a table of frames.
+    """Raise if the argument is not a table of frames (`RobotTable`).
+
+    Args:
+        table: argument of a function.
 
     Raises:
         DescriptionError: the argument is a mechanism, a system or another object.
@@ -256,21 +271,25 @@ Row = TypeVar("Row", FrameRow, InertiaRow)
 
 
 def _with_scalars(where: str, row: Row, names: tuple[str, ...]) -> Row:
+    """Return the row with the fields `names` as expressions; `where` is for error messages."""
     values: dict[str, Any] = {n: expression(getattr(row, n), f"{where}, {n}") for n in names}
     return replace(row, **values)
 
 
 def _bare(row: Row, names: tuple[str, ...]) -> Row:
-    """Return the row with symbols without default values, which are stored in the table."""
+    """Return the row with symbols without default values, which are stored in the table.
+
+    `names` are the scalar fields of the row.
+    """
     values: dict[str, Any] = {n: expression(str(getattr(row, n))) for n in names}
     if isinstance(row, InertiaRow):
         values["frame"] = int(row.frame) if _is_int(row.frame) else row.frame
-        values["rotor"] = row.rotor and replace(row.rotor, **_bare_scalars(row.rotor))
+        if row.rotor is not None:
+            scalars: dict[str, Any] = {
+                n: expression(str(getattr(row.rotor, n))) for n in ("inertia", "ratio")
+            }
+            values["rotor"] = replace(row.rotor, **scalars)
     return replace(row, **values)
-
-
-def _bare_scalars(rotor: Rotor) -> dict[str, Expression]:
-    return {name: expression(str(getattr(rotor, name))) for name in ("inertia", "ratio")}
 
 
 def _plain_cut(loop: CutRow) -> CutRow:
@@ -280,6 +299,10 @@ def _plain_cut(loop: CutRow) -> CutRow:
 
 
 def _checked_frame(where: str, j: int, row: FrameRow) -> FrameRow:
+    """Return row j with its values as expressions and numbers.
+
+    Raise a DescriptionError that begins with `where` if the row is inconsistent.
+    """
     if not _is_int(row.sigma) or row.sigma not in (0, 1, 2):
         raise DescriptionError(
             f"{where}: sigma is {row.sigma!r}; use 0 (revolute), 1 (prismatic) or 2 (fixed)"
@@ -306,6 +329,7 @@ def _checked_frame(where: str, j: int, row: FrameRow) -> FrameRow:
 
 
 def _limits(where: str, limits: Any) -> tuple[float, float]:
+    """Return (lower, upper) of joint limits; raise a DescriptionError if they are not ordered."""
     pair = list(limits) if isinstance(limits, (list, tuple, np.ndarray)) else []
     numbers = [number(value, f"{where}: limits") for value in pair]
     if len(numbers) != 2 or not numbers[0] < numbers[1]:
@@ -316,13 +340,20 @@ def _limits(where: str, limits: Any) -> tuple[float, float]:
 
 
 def _gravity(name: str, gravity: Any) -> tuple[Expression, ...]:
+    """Return the three components of gravity as expressions; raise a DescriptionError otherwise.
+
+    `name` is the name of the robot.
+    """
     if not isinstance(gravity, (list, tuple, np.ndarray)) or len(gravity) != 3:
         raise DescriptionError(f"{name}: gravity {gravity!r} has not three values; give [x, y, z]")
     return tuple(expression(g, f"{name}, gravity") for g in gravity)
 
 
 def _values(name: str, given: Mapping[str, float], rows: Any) -> dict[str, float]:
-    """Return the values of the symbols: given values, and defaults of Parameters in the rows."""
+    """Return the values of the symbols: given values, and else defaults of Parameters in the rows.
+
+    `rows` are (frames, bodies, gravity). Raise a DescriptionError for a value of an unused symbol.
+    """
     used: dict[str, float | None] = {}
     for scalar in _scalars(rows):
         for symbol in parameters_of(scalar):
@@ -339,6 +370,10 @@ def _values(name: str, given: Mapping[str, float], rows: Any) -> dict[str, float
 
 
 def _guess(table: RobotTable) -> dict[str, float]:
+    """Return the guess of a table as numbers by joint.
+
+    Raise a DescriptionError for unknown joints.
+    """
     where = f"{table.name}, guess"
     known = [table.joint_name(j) for j in range(1, len(table.frames) + 1) if _has_joint(table, j)]
     values: dict[str, float] = {}
@@ -352,6 +387,7 @@ def _guess(table: RobotTable) -> dict[str, float]:
 
 
 def _scalars(rows: Any) -> Iterator[Expression]:
+    """Yield all scalar expressions of (frames, bodies, gravity)."""
     frames, bodies, gravity = rows
     for row in frames:
         yield from (getattr(row, key) for key in GEOMETRY)
@@ -362,6 +398,7 @@ def _scalars(rows: Any) -> Iterator[Expression]:
 
 
 def _check_bodies(table: RobotTable) -> None:
+    """Raise a DescriptionError if a body row has no frame of its own, or drives a fixed frame."""
     seen: set[int] = set()
     for body in table.bodies:
         where = f"{table.name}/body {body.frame}"
@@ -377,6 +414,7 @@ def _check_bodies(table: RobotTable) -> None:
 
 
 def _check_loops(table: RobotTable) -> None:
+    """Raise a DescriptionError if cuts share frames, or a cut frame has a body or descendants."""
     used: set[int] = set()
     for k, loop in enumerate(table.loops, 1):
         where = f"{table.name}/loop {k}"
@@ -395,7 +433,8 @@ def _check_loops(table: RobotTable) -> None:
                 )
     for body in table.bodies:
         driven = body.drive and not _is_moving(table, body.frame)
-        if body.frame in table.cut_frames and (driven or _has_inertia(body)):
+        has_inertia = any(to_float(getattr(body, name)) != 0 for name in TEN_PARAMETERS)
+        if body.frame in table.cut_frames and (driven or has_inertia):
             raise DescriptionError(
                 f"{table.name}/body {body.frame}: the frame belongs to a cut joint, which has no"
                 " body; give the inertia to the link it is placed on"
@@ -403,15 +442,17 @@ def _check_loops(table: RobotTable) -> None:
 
 
 def _is_moving(table: RobotTable, frame: int) -> bool:
-    """Whether the frame moves with the variable of a cut joint."""
+    """Whether the frame with this number moves with the variable of a cut joint."""
     return any(loop.cut[0] == frame for loop in table.loops)
 
 
 def _has_joint(table: RobotTable, frame: int) -> bool:
+    """Whether the frame with this number has a joint: sigma is 0 or 1, or it is cut."""
     return table.frames[frame - 1].sigma != 2 or _is_moving(table, frame)
 
 
 def _check_loop(where: str, loop: CutRow, frames: tuple[FrameRow, ...]) -> None:
+    """Raise a DescriptionError if a cut has an unknown joint, wrong frames or a wrong sigma."""
     if loop.joint not in LOOP_JOINTS:
         raise DescriptionError(
             f"{where}: joint {loop.joint!r} is unknown;"
@@ -432,11 +473,8 @@ def _check_loop(where: str, loop: CutRow, frames: tuple[FrameRow, ...]) -> None:
         )
 
 
-def _has_inertia(body: InertiaRow) -> bool:
-    return any(to_float(getattr(body, name)) != 0 for name in TEN_PARAMETERS)
-
-
 def _is_int(value: object) -> bool:
+    """Whether a value is a Python or numpy integer; booleans are not."""
     return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
 
 
@@ -463,8 +501,12 @@ def to_mechanism(table: RobotTable) -> Mechanism:
     body fixed to its antecedent. The two frames of a cut become one joint between their links, at
     which the loop is cut. It is passive unless the row of its moving frame is actuated.
 
+    Args:
+        table: table of frames.
+
     Raises:
-        DescriptionError: a body is physically inconsistent, two names are equal, or the base moves.
+        DescriptionError: the argument is not a table, a body is physically inconsistent, two names
+            are equal, or the base moves.
     """
     require_table(table)
     _check_base(table)
@@ -490,7 +532,8 @@ def to_mechanism(table: RobotTable) -> Mechanism:
         if frame.sigma == 2:
             mechanism.connect(point, links[j])
         else:
-            joint = _MOVING[frame.sigma](**_joint(table, j, row, _actuated(table, frame)))
+            actuated = True if frame.actuated is None and not table.loops else frame.actuated
+            joint = _MOVING[frame.sigma](**_joint(table, j, row, actuated))
             mechanism.connect(point, joint, links[j])
     for loop in table.loops:
         _close(mechanism, table, loop, links, rows.get(loop.cut[0], InertiaRow(loop.cut[0])))
@@ -504,6 +547,7 @@ def _close(
     links: dict[int, RigidBody],
     row: InertiaRow,
 ) -> None:
+    """Add the cut joint of a loop between two links; `row` is the body row with its drive."""
     moving, fixed = loop.cut
     scalars = _joint(table, moving, row, bool(table.frames[moving - 1].actuated))
     joint = _CLOSING[loop.joint](**scalars)
@@ -512,9 +556,10 @@ def _close(
 
 
 def _place(table: RobotTable, j: int, links: Mapping[int, RigidBody]) -> Point:
-    """Return the zero position of frame j, relative to an existing link.
+    """Return frame j at joint position zero, relative to an existing link.
 
-    The antecedent may be the fixed frame of a cut, which is itself fixed to a link.
+    The antecedent may be the fixed frame of a cut, which is itself fixed to a link. `links` are the
+    bodies by frame number.
     """
     rows = [table.frames[j - 1]]
     while rows[-1].antecedent not in links:
@@ -525,11 +570,11 @@ def _place(table: RobotTable, j: int, links: Mapping[int, RigidBody]) -> Point:
     return point
 
 
-def _actuated(table: RobotTable, frame: FrameRow) -> bool | None:
-    return True if frame.actuated is None and not table.loops else frame.actuated
-
-
 def _joint(table: RobotTable, j: int, row: InertiaRow, actuated: bool | None) -> dict[str, Any]:
+    """Return the keyword arguments of the joint component of frame j.
+
+    They are its name, its limits, and the drive from the body row.
+    """
     return {
         "name": table.joint_name(j),
         "actuated": actuated,
@@ -539,11 +584,13 @@ def _joint(table: RobotTable, j: int, row: InertiaRow, actuated: bool | None) ->
 
 
 def _body(j: int, row: InertiaRow) -> KhalilBody:
+    """Return the body of frame j with the inertial parameters of its row."""
     ten: dict[str, Any] = {name: getattr(row, name) for name in TEN_PARAMETERS}
     return KhalilBody(row.name or f"link{j}", grouped=row.grouped, **ten)
 
 
 def _check_base(table: RobotTable) -> None:
+    """Raise a DescriptionError if the table contains a motion of the base."""
     for key in _BASE_MOTION:
         if any(to_float(expression(text)) != 0 for text in table.extras.get(key, ())):
             raise DescriptionError(
@@ -562,12 +609,24 @@ POSE = "Z"
 
 
 def base_pose_texts(pose: Array) -> tuple[str, ...]:
-    """Return the texts of the vector for a pose (4, 4)."""
+    """Return the vector Z of a base pose as 16 texts.
+
+    Args:
+        pose: (4, 4) homogeneous matrix of the base in the world; its elements are written row by
+            row.
+    """
     return tuple(repr(float(value) + 0.0) for value in np.ravel(pose))
 
 
 def placement_pose(placement: Placement, values: Mapping[str, float]) -> Array | None:
-    """Return the pose (4, 4) of a mount; None if one of its symbols has no value."""
+    """Return the base pose in the world as a numeric matrix (4, 4).
+
+    None if a symbol of the placement has no value, or if an element is not finite.
+
+    Args:
+        placement: mount of the base on the world, which may contain symbols.
+        values: numeric values of the symbols, by name.
+    """
     names = {symbol.name for value in placement.expressions() for symbol in parameters_of(value)}
     if not names <= set(values):
         return None
@@ -577,7 +636,15 @@ def placement_pose(placement: Placement, values: Mapping[str, float]) -> Array |
 
 
 def base_placement(extras: Mapping[str, Sequence[str]]) -> tuple[Placement, list[ImportNote]]:
-    """Return the mount that a table contains, and a note if its vector is no pose in numbers."""
+    """Return the mount of the base on the world from the extra data of a table of frames.
+
+    Args:
+        extras: extra vectors of the table as texts; the vector "Z" has the 16 elements of the pose.
+
+    Returns:
+        The mount and the import notes. The mount is the identity if there is no vector "Z". If the
+        vector is not a numeric pose, the mount is the identity as well, and there is one note.
+    """
     texts = extras.get(POSE, ())
     values = [to_float(expression(text)) for text in texts]
     if not texts or values == np.eye(4).ravel().tolist():

@@ -39,6 +39,9 @@ _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 def read_toml(path: str | Path) -> RobotTable:
     """Read a TOML file as a table of frames.
 
+    Args:
+        path: path of the .toml file.
+
     Raises:
         DescriptionError: the file is missing or not TOML, or the table is inconsistent.
     """
@@ -51,7 +54,11 @@ def read_toml(path: str | Path) -> RobotTable:
 
 
 def from_dict(data: Mapping[str, Any]) -> RobotTable:
-    """Return the table of a dict in the TOML schema.
+    """Return the table of frames of a dict in the TOML schema.
+
+    Args:
+        data: content of a TOML file: name, frame, body, loop, gravity, parameters, source, guess
+            and extras. Only the name and one frame are required.
 
     Raises:
         DescriptionError: a key is unknown or missing, a value has the wrong type, or the table is
@@ -78,7 +85,11 @@ def from_dict(data: Mapping[str, Any]) -> RobotTable:
 
 
 def write_toml(table: RobotTable, path: str | Path) -> None:
-    """Write a table as a TOML file, which `read_toml` reads as an equal table.
+    """Write a table of frames as a TOML file, which `read_toml` reads as an equal table.
+
+    Args:
+        table: table of frames.
+        path: path of the .toml file.
 
     Raises:
         DescriptionError: the argument is not a table.
@@ -88,7 +99,10 @@ def write_toml(table: RobotTable, path: str | Path) -> None:
 
 
 def to_dict(table: RobotTable) -> dict[str, Any]:
-    """Return a table as a dict in the TOML schema, without default values.
+    """Return a table of frames as a dict in the TOML schema, without default values.
+
+    Args:
+        table: table of frames.
 
     Raises:
         DescriptionError: the argument is not a table.
@@ -111,6 +125,7 @@ def to_dict(table: RobotTable) -> dict[str, Any]:
 
 
 def _frame(row: Mapping[str, Any], where: str) -> FrameRow:
+    """Return the frame row of a dict; raise a DescriptionError that begins with `where`."""
     _check_keys(row, _FRAME, where)
     if "antecedent" not in row:
         raise DescriptionError(f"{where}: the antecedent is missing; give 0 or an earlier frame")
@@ -125,6 +140,10 @@ def _frame(row: Mapping[str, Any], where: str) -> FrameRow:
 
 
 def _sigma(row: Mapping[str, Any], where: str) -> Any:
+    """Return sigma of a frame from its key `joint` or `sigma`.
+
+    Raise a DescriptionError if the joint is unknown or the two keys contradict.
+    """
     if "joint" not in row:
         return row.get("sigma", 0)
     joint = row["joint"]
@@ -141,6 +160,10 @@ def _sigma(row: Mapping[str, Any], where: str) -> Any:
 
 
 def _actuated(row: Mapping[str, Any], where: str) -> bool | None:
+    """Return the key `actuated` or `mu` of a frame as bool, None if both are missing.
+
+    Raise a DescriptionError if it is not a truth value or the two keys contradict.
+    """
     given = [row[key] for key in ("actuated", "mu") if key in row]
     if any(value not in (True, False) for value in given) or len(set(given)) > 1:
         raise DescriptionError(
@@ -150,6 +173,7 @@ def _actuated(row: Mapping[str, Any], where: str) -> bool | None:
 
 
 def _body(row: Mapping[str, Any], where: str) -> InertiaRow:
+    """Return the body row of a dict; raise a DescriptionError that begins with `where`."""
     _check_keys(row, _BODY, where)
     if "frame" not in row:
         raise DescriptionError(f"{where}: the frame is missing; give the number of its frame")
@@ -166,6 +190,7 @@ def _body(row: Mapping[str, Any], where: str) -> InertiaRow:
 
 
 def _rotor(data: Any, where: str) -> Rotor:
+    """Return the rotor of a dict; raise a DescriptionError that begins with `where`."""
     if not isinstance(data, Mapping) or "inertia" not in data:
         raise DescriptionError(
             f"{where} is {data!r}; give a table {{inertia = ..., ratio = ..., axis = ...}}"
@@ -178,6 +203,7 @@ def _rotor(data: Any, where: str) -> Rotor:
 
 
 def _loop(row: Mapping[str, Any], where: str) -> CutRow:
+    """Return the cut of a loop from a dict; raise a DescriptionError that begins with `where`."""
     _check_keys(row, _LOOP, where)
     cut = row.get("cut")
     if not isinstance(cut, (list, tuple)) or len(cut) != 2:
@@ -186,6 +212,10 @@ def _loop(row: Mapping[str, Any], where: str) -> CutRow:
 
 
 def _rows(data: Mapping[str, Any], key: str, name: str) -> Iterable[tuple[Mapping[str, Any], str]]:
+    """Return the dicts under `key` with their location for error messages.
+
+    Raise a DescriptionError if the value is not a list of dicts. `name` is that of the robot.
+    """
     rows = data.get(key, ())
     if not isinstance(rows, (list, tuple)) or not all(isinstance(row, Mapping) for row in rows):
         raise DescriptionError(f"{name}: {key} is {rows!r}; give a list of tables [[{key}]]")
@@ -193,6 +223,10 @@ def _rows(data: Mapping[str, Any], key: str, name: str) -> Iterable[tuple[Mappin
 
 
 def _table(data: Mapping[str, Any], key: str, name: str) -> Mapping[str, Any]:
+    """Return the dict under `key`, empty if it is missing.
+
+    Raise a DescriptionError for other types.
+    """
     table = data.get(key, {})
     if not isinstance(table, Mapping):
         raise DescriptionError(f"{name}: {key} is {table!r}; give a table of names and values")
@@ -200,6 +234,10 @@ def _table(data: Mapping[str, Any], key: str, name: str) -> Mapping[str, Any]:
 
 
 def _text(data: Mapping[str, Any], key: str, where: str) -> str:
+    """Return the text under `key`, empty if it is missing.
+
+    Raise a DescriptionError for other types.
+    """
     text = data.get(key, "")
     if not isinstance(text, str):
         raise DescriptionError(f"{where}: {key} is {text!r}; give a text in quotes")
@@ -207,18 +245,21 @@ def _text(data: Mapping[str, Any], key: str, where: str) -> str:
 
 
 def _texts(values: Any, where: str) -> tuple[str, ...]:
+    """Return a list of texts as a tuple; raise a DescriptionError for other types."""
     if not isinstance(values, (list, tuple)) or not all(isinstance(v, str) for v in values):
         raise DescriptionError(f"{where}: {values!r} is not a list of texts; quote each value")
     return tuple(values)
 
 
 def _check_keys(data: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
+    """Raise a DescriptionError if a dict has a key that is not known."""
     for key in data:
         if key not in known:
             raise DescriptionError(f"{where}: key {key!r} is unknown; {did_you_mean(key, known)}")
 
 
 def _frame_dict(row: FrameRow) -> dict[str, Any]:
+    """Return a frame row as a dict in the TOML schema, without default values."""
     data: dict[str, Any] = {"antecedent": row.antecedent, "joint": JOINTS[row.sigma]}
     if row.actuated is not None:
         data["actuated"] = row.actuated
@@ -232,12 +273,13 @@ def _frame_dict(row: FrameRow) -> dict[str, Any]:
 
 
 def _range(pair: tuple[float, float]) -> float | list[float]:
-    """Return one number if the limits are symmetric, otherwise [lower, upper]."""
+    """Return limits as the upper limit if they are symmetric, otherwise as [lower, upper]."""
     lower, upper = pair
     return upper if lower == -upper else [lower, upper]
 
 
 def _body_dict(row: InertiaRow) -> dict[str, Any]:
+    """Return a body row as a dict in the TOML schema, without default values."""
     data: dict[str, Any] = {"frame": row.frame, **_without_defaults(row, BODY_SCALARS)}
     if row.rotor is not None:
         data["rotor"] = _without_defaults(row.rotor, ("inertia", "ratio"))
@@ -251,16 +293,19 @@ def _body_dict(row: InertiaRow) -> dict[str, Any]:
 
 
 def _without_defaults(row: FrameRow | InertiaRow | Rotor, scalars: Iterable[str]) -> dict[str, Any]:
+    """Return the fields `scalars` of a row that differ from their defaults, by name."""
     defaults = {field.name: field.default for field in fields(row)}
     values = {key: _plain(getattr(row, key)) for key in scalars}
     return {key: value for key, value in values.items() if value != defaults[key]}
 
 
 def _plain(value: Scalar) -> float | str:
+    """Return a number as float, and another expression as text."""
     return value.value if isinstance(value, Number) else str(value)
 
 
 def _lines(data: Mapping[str, Any]) -> Iterable[str]:
+    """Return the lines of the TOML file of a dict: values, then tables, then lists of tables."""
     rows = {key: v for key, v in data.items() if key in ("frame", "body", "loop")}
     tables = {key: v for key, v in data.items() if isinstance(v, Mapping)}
     for key, value in data.items():
@@ -276,10 +321,12 @@ def _lines(data: Mapping[str, Any]) -> Iterable[str]:
 
 
 def _key(name: str) -> str:
+    """Return a TOML key, in quotes if its characters require it."""
     return name if _BARE_KEY.fullmatch(name) else _toml(name)
 
 
 def _toml(value: Any) -> str:
+    """Return a value in TOML syntax: bool, text, number, list or table."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):

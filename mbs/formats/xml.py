@@ -36,7 +36,11 @@ class XmlElement(Element):
 
 
 def line_of(element: Element | None) -> int | None:
-    """Return the line number at which an element begins, or None if it is unknown."""
+    """Return the line number (from 1) at which an element begins; None if it is unknown.
+
+    Args:
+        element: XML element, or None.
+    """
     return getattr(element, "line", None)
 
 
@@ -71,7 +75,7 @@ def parse_content(path: str, content: bytes, notes: Notes | None = None) -> Elem
     except (expat.ExpatError, LookupError, ValueError):
         pass  # expat raises the last two for an unknown encoding
     notes = Notes(path) if notes is None else notes
-    text = _mend(content, notes)
+    text = _repaired(content, notes)
     builder = _Builder(path)
     try:
         return builder.parse(text)
@@ -90,7 +94,16 @@ _JUNK = expat.errors.codes[expat.errors.XML_ERROR_JUNK_AFTER_DOC_ELEMENT]
 
 
 class _Builder:
-    """Element tree builder that receives the events of expat."""
+    """Parser that builds an element tree from the events of expat.
+
+    Attributes:
+        path: path of the file, for error messages.
+        root: root element, None before the first element.
+        open: elements that are not closed yet, the innermost last.
+        count: number of elements so far.
+        closed: last closed element, which receives the text after it; None after a start tag.
+        parser: the expat parser.
+    """
 
     def __init__(self, path: str) -> None:
         self.path = path
@@ -106,11 +119,16 @@ class _Builder:
         self.parser.CharacterDataHandler = self._data
 
     def parse(self, content: bytes | str) -> Element:
+        """Parse a complete XML text and return the root element.
+
+        Raise ExpatError if it is invalid.
+        """
         self.parser.Parse(content, True)
         assert self.root is not None  # expat raises if a text has no elements
         return self.root
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        """Add an element; raise a DescriptionError for too many or too deeply nested elements."""
         self.count += 1
         if self.count > _MOST_ELEMENTS or len(self.open) >= _DEEPEST:
             what = (
@@ -129,9 +147,11 @@ class _Builder:
         self.closed = None
 
     def _end(self, tag: str) -> None:
+        """Close the innermost element."""
         self.closed = self.open.pop()
 
     def _data(self, text: str) -> None:
+        """Append text to the innermost element or, as its tail, to the last closed element."""
         if self.closed is not None:
             self.closed.tail = (self.closed.tail or "") + text
         else:
@@ -142,15 +162,18 @@ _DECLARED = re.compile(rb"""encoding\s*=\s*["']([A-Za-z0-9._-]{1,40})["']""")
 _DECLARATION = re.compile(r"<\?xml\b[^<>]*\?>")
 _BARE = re.compile(r"&(?!#?\w{1,32};)")
 _UNSEEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")
-_MENDS = (
+_REPAIRS = (
     (_DECLARATION, "", "the XML declaration", "left out, for it is not at the beginning"),
     (_BARE, "&amp;", "a bare &", "read as &amp;"),
     (_UNSEEN, "", "control characters", "left out"),
 )
 
 
-def _mend(content: bytes, notes: Notes) -> str:
-    """Return a repaired text with the line numbers of the file."""
+def _repaired(content: bytes, notes: Notes) -> str:
+    """Return the text of a malformed XML file with common errors repaired.
+
+    Line numbers are kept, and a note reports each kind of repair.
+    """
     declared = _DECLARED.search(content[:200])
     encoding = declared.group(1).decode() if declared else "utf-8"
     try:
@@ -172,7 +195,7 @@ def _mend(content: bytes, notes: Notes) -> str:
     first = _DECLARATION.match(text)
     if first is not None:  # its encoding has already been read
         text = text[first.end() :]
-    for pattern, by, element, what in _MENDS:
+    for pattern, by, element, what in _REPAIRS:
         found = pattern.search(text)
         if found is not None:
             line = text[: found.start()].count("\n") + 1
@@ -182,7 +205,7 @@ def _mend(content: bytes, notes: Notes) -> str:
 
 
 def _replace(pattern: re.Pattern[str], by: str, text: str) -> str:
-    """Replace every match, and keep the line breaks of the matches."""
+    """Replace every match of a pattern by a text, and keep the line breaks of the matches."""
 
     def replacement(found: re.Match[str]) -> str:
         return by + "\n" * found.group().count("\n")
@@ -191,7 +214,7 @@ def _replace(pattern: re.Pattern[str], by: str, text: str) -> str:
 
 
 def _without_comments(text: str) -> str:
-    """Remove comments and keep their line breaks; comments may contain two hyphens."""
+    """Remove XML comments and keep their line breaks; a comment may contain two hyphens."""
     parts, at = [], 0
     while (start := text.find("<!--", at)) >= 0:
         end = text.find("-->", start + 4)
@@ -206,7 +229,7 @@ def _without_comments(text: str) -> str:
 
 
 def text_of(values: Iterable[Any]) -> str:
-    """Format numbers separated by blanks, with all digits of a double."""
+    """Return numbers as a text separated by blanks, with all digits of a double."""
     return " ".join(repr(float(value) + 0.0) for value in values)
 
 

@@ -16,14 +16,14 @@ _D3, _D4, _R5, _R6, _D7, _R8, _D13, _D14 = -0.2, 0.2, 0.3, 0.3, 0.3, 0.5, 0.2, 0
 
 
 def akr3000() -> Mechanism:
-    """AKR3000: ten links, two loops with a linear motor each, a wrist of three motors.
+    """Painting robot AKR3000: ten links, and two loops with one linear motor each.
 
-    Actuated are the trunk q1, the linear motors q5 and q6, and the wrist q8, q9, q10. Motor q6,
-    between the trunk (joint q4) and the arm, lifts the arm q2; motor q5, between the trunk (q3)
-    and the forearm, lifts the forearm q7. The loops are opened at q11 and q12. It is assembled
-    with an upright arm and a level forearm.
+    The trunk q1, the linear motors q5 and q6, and the wrist joints q8, q9 and q10 are actuated.
+    Motor q6 acts between the trunk (joint q4) and the arm, and lifts the arm q2. Motor q5 acts
+    between the trunk (joint q3) and the forearm, and lifts the forearm q7. The loops are cut at q11
+    and q12. The mechanism is assembled with an upright arm and a level forearm.
 
-    Source: frames of the example AKR3000 of OpenSYMORO, Khalil et al. 2014, its lengths in m.
+    Source: frames of the example AKR3000 of OpenSYMORO, Khalil et al. 2014, with its lengths in m.
     Masses and inertias are illustrative.
     """
     half = pi / 2

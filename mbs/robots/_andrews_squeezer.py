@@ -25,11 +25,12 @@ _OF, _FE, _BE, _EG, _AG, _AH, _HE = 0.007, 0.028, 0.035, 0.020, 0.040, 0.040, 0.
 
 
 def andrews_squeezer() -> Mechanism:
-    """Seven-body mechanism: crank OF driven, three loops that meet in E, a spring from D to C.
+    """Andrews' squeezing mechanism: seven bodies, three loops that share the point E.
 
-    The angles beta, theta, gamma, phi, delta, omega, epsilon are q1 .. q7 of the sources. Gravity
-    does not act. The drive is `tau={"beta": 0.033}` [N m]; it starts at rest. The mechanism is
-    planar: of the moments of inertia only those about z are published and matter.
+    The crank OF is driven, and a spring connects the points D and C. The angles beta, theta, gamma,
+    phi, delta, omega and epsilon are q1 .. q7 of the sources. Gravity does not act. The benchmark
+    starts at rest with the drive `tau={"beta": 0.033}` [N m]. The mechanism is planar, so that only
+    the published moments of inertia about z have an effect.
 
     Source: Hairer & Wanner 1996, section VII.7; Mazzia & Magherini 2008.
     """
@@ -60,5 +61,10 @@ def andrews_squeezer() -> Mechanism:
 
 
 def _lamina(name: str, mass: float, com: tuple[float, float], about_com: float) -> Body:
+    """Return a plane body.
+
+    `mass` in [kg], centre of mass `com` (x, y) in [m], moment of inertia `about_com` about the z
+    axis through it in [kg m^2].
+    """
     half = about_com / 2
     return Body(name, mass=mass, com=(*com, 0), inertia=(half, half, about_com))

@@ -17,12 +17,14 @@ _AXES = "yzxyzx"
 
 
 def bricard() -> Mechanism:
-    """Bricard's mechanism: six revolute joints in one loop, of mobility 1 where Gruebler counts 0.
+    """Bricard's mechanism: one loop of six revolute joints, with one degree of freedom.
 
-    Five rods of 1 m, 1 kg and 0.1 m x 0.1 m section run along the edges of a unit cube, along x,
-    -y, z, -x and y; the ground is the sixth edge. Joints j1 .. j6 about y, z, x, y, z, x of the
-    assembled configuration, where all are zero; j6, back on the ground at (0, 0, 1), closes the
-    loop. Gravity is along -y; it starts at rest. Its output is P3, the end of the third rod.
+    Gruebler's formula gives zero degrees of freedom. Five rods of 1 m length, 1 kg mass and 0.1 m x
+    0.1 m section lie along edges of a unit cube, in the directions x, -y, z, -x and y; the ground
+    is the sixth edge. The axes of the joints j1 .. j6 are y, z, x, y, z and x in the assembled
+    configuration, where all joint positions are zero. Joint j6 on the ground at (0, 0, 1) closes
+    the loop. Gravity is along -y, and the benchmark starts at rest. The frame P3 is at the end of
+    the third rod.
 
     Source: Gonzalez et al. 2006, problem A04; Bricard 1897.
     """
@@ -41,4 +43,5 @@ def bricard() -> Mechanism:
 
 
 def _hinge(k: int) -> Revolute:
+    """Return the passive revolute joint with index k (from 0), about its axis at zero."""
     return Revolute(f"j{k + 1}", axis=_AXES[k], actuated=False)

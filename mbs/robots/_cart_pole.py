@@ -11,11 +11,11 @@ _SOURCE = "Textbook system; values of Barto, Sutton & Anderson 1983, without fri
 
 
 def cart_pole() -> Mechanism:
-    """Cart and pole: q1 the cart along x of the base, q2 the angle of the pole from upright.
+    """Cart with a pole: cart position q1 along x of the base, pole angle q2 from upright.
 
-    A positive q2 tips the pole towards positive q1.
+    Only the cart is driven. A positive q2 tips the pole towards positive q1.
 
-    Source: Barto, Sutton & Anderson 1983: cart 1 kg, pole 0.1 kg and 1 m long; the pole is
+    Source: Barto, Sutton & Anderson 1983: cart of 1 kg, pole of 0.1 kg and 1 m length. The pole is
     0.02 m thick, which is illustrative, and there is no friction.
     """
     half = pi / 2

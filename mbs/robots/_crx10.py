@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from math import pi, radians
+from math import pi
 
 from mbs.mechanism import Mechanism
-from mbs.robots.rows import cuboid, frame, robot
+from mbs.robots.rows import cuboid, degrees, frame, robot
 
 _SOURCE = (
     "Geometry: FANUC data sheet of the CRX-10iA, 245, 540, 540, 150 and 160 mm; joint ranges: the"
@@ -15,22 +15,23 @@ _SOURCE = (
 
 
 def crx10() -> Mechanism:
-    """FANUC CRX-10iA: six revolute joints, q1 .. q6, last axis 150 mm beside the forearm.
+    """FANUC CRX-10iA: six revolute joints q1 .. q6, without a spherical wrist.
 
-    The upper arm stands upright at zero, the forearm lies along x of the base; q3 is the angle
-    between the two. Frame 6 is on the flange, its z axis points back into the arm.
+    The last axis is 150 mm from the axis of the forearm. At zero the upper arm is upright and the
+    forearm is along x of the base. q3 is the angle between upper arm and forearm. Frame 6 is on the
+    flange, and its z axis points back into the arm.
 
     Source: lengths of the FANUC data sheet of the CRX-10iA; joint ranges of its description
     fanuc_crx_description. Masses, inertias and rotors are illustrative.
     """
     half = pi / 2
     frames = [
-        frame(0, r=0.245, limits=_degrees(-190, 190)),
-        frame(1, alpha=-half, theta=-half, limits=_degrees(-179.9, 179.9)),
-        frame(2, alpha=pi, d=0.54, limits=_degrees(-71, 251)),
-        frame(3, alpha=-half, r=-0.54, limits=_degrees(-190, 190)),
-        frame(4, alpha=half, r=0.15, limits=_degrees(-179.9, 179.9)),
-        frame(5, alpha=-half, r=-0.16, limits=_degrees(-225, 225)),
+        frame(0, r=0.245, limits=degrees(-190, 190)),
+        frame(1, alpha=-half, theta=-half, limits=degrees(-179.9, 179.9)),
+        frame(2, alpha=pi, d=0.54, limits=degrees(-71, 251)),
+        frame(3, alpha=-half, r=-0.54, limits=degrees(-190, 190)),
+        frame(4, alpha=half, r=0.15, limits=degrees(-179.9, 179.9)),
+        frame(5, alpha=-half, r=-0.16, limits=degrees(-225, 225)),
     ]
     bodies = [
         cuboid(1, 10, (0.18, 0.18, 0.2), (0, 0, -0.05), Ia=0.6),
@@ -41,7 +42,3 @@ def crx10() -> Mechanism:
         cuboid(6, 0.5, (0.08, 0.08, 0.06), (0, 0, 0.05), Ia=0.05),
     ]
     return robot("crx10", _SOURCE, frames, bodies)
-
-
-def _degrees(low: float, high: float) -> list[float]:
-    return [radians(low), radians(high)]

@@ -24,16 +24,16 @@ _FOREARM_MASS, _PLATFORM_MASS = 0.12, 0.8
 
 
 def delta() -> Mechanism:
-    """Delta robot: q1, q2, q3 lift or lower the arms, the platform only translates.
+    """Delta robot: motors q1, q2 and q3 move a platform that only translates.
 
-    Three arms of 0.25 m hang on a circle of 0.2 m radius, at 0, 120 and 240 degrees; a positive
-    angle lowers an arm. A pair of rods of 0.6 m, 0.08 m apart, leads from each elbow to the circle
-    of 0.05 m radius on the platform, below the base. The rods have no mass of their own: of the
-    0.12 kg of each pair two thirds are at the elbow and one third on the platform. It is assembled
-    with horizontal arms. The frame `tool` is in the middle of the platform.
+    Three arms of 0.25 m length are mounted on a circle of 0.2 m radius, at 0, 120 and 240 degrees;
+    a positive angle lowers an arm. A pair of rods of 0.6 m length, 0.08 m apart, connects each
+    elbow with a circle of 0.05 m radius on the platform, below the base. The rods are massless: two
+    thirds of the 0.12 kg of each pair are at the elbow, one third is on the platform. The mechanism
+    is assembled with horizontal arms. The frame `tool` is in the middle of the platform.
 
-    Source: structure of Clavel 1988; masses of the forearms as in Codourey 1998. Lengths and
-    masses are illustrative.
+    Source: structure of Clavel 1988; masses of the forearms as in Codourey 1998. Lengths and masses
+    are illustrative.
     """
     height = sqrt(_FOREARM**2 - (_BASE + _ARM - _PLATFORM) ** 2)
     m = Mechanism("delta", source=_SOURCE, guess={"platform.z": -height})

@@ -9,16 +9,17 @@ _SOURCE = "Textbook mechanism; ratio, masses and inertias are illustrative"
 
 
 def differential_wrist(ratio: float = 1.0) -> Mechanism:
-    """Differential wrist: motors q1, q2 turn two side gears about y, the tool pitches and rolls.
+    """Wrist of bevel gears: two motors q1 and q2 together pitch and roll the tool.
 
-    The carrier turns about y in `pitch`; the tool turns on it about x in `roll`, and its bevel
-    gear meshes with both side gears, which turn by mesh1, mesh2 on the carrier: roll = ratio mesh1
-    = -ratio mesh2. Hence pitch = (q1 + q2) / 2 and roll = ratio (q1 - q2) / 2. The shafts of the
-    motors lie on one line with the carrier's: each closes a loop of which only the turn is
-    independent. Ratio, masses and inertias are illustrative.
+    The motors rotate two side gears about y. The carrier rotates about y by `pitch`. The tool
+    rotates on the carrier about x by `roll`, and its bevel gear meshes with both side gears, which
+    rotate by mesh1 and mesh2 on the carrier: roll = ratio mesh1 = -ratio mesh2. Hence pitch = (q1 +
+    q2) / 2 and roll = ratio (q1 - q2) / 2. The axes of motors and carrier coincide: in each loop
+    that a motor closes, only the rotation about this axis is an independent condition. Ratio,
+    masses and inertias are illustrative.
 
     Args:
-        ratio: teeth of a side gear over those of the tool's gear.
+        ratio: number of teeth of a side gear divided by that of the gear of the tool.
     """
     m = Mechanism("differential_wrist", source=_SOURCE, guess={"pitch": 0.0})
     carrier = m.add(Body("carrier", mass=1.2, com=(0.02, 0, 0), inertia=(2e-3, 2e-3, 2.5e-3)))

@@ -11,7 +11,7 @@ _GROUND, _CRANK, _COUPLER = 0.2, 0.25, 0.35
 
 
 def five_bar() -> Mechanism:
-    """Five-bar linkage in a vertical plane: cranks q1, q3 driven, couplers q2, q4, cut joint q5.
+    """Planar five-bar linkage in a vertical plane, with motors q1 and q3 on the ground.
 
     Cranks of 0.25 m turn about points 0.2 m apart, couplers of 0.35 m meet in the cut joint. It is
     assembled symmetric, the cut joint above the ground. The frame `tool` is in the cut joint, on

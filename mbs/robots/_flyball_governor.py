@@ -21,14 +21,16 @@ _UPRIGHT = ("y", pi / 2)
 
 
 def flyball_governor() -> Mechanism:
-    """Watt's governor, its lower rods replaced by stiff spring-dampers.
+    """Watt's flyball governor with stiff spring-dampers in place of the lower rods.
 
-    A shaft of 1 m spins about z by `spin`; a slider, a cube of 0.1 m, runs along it by `s` above
-    its foot. Two rods of 1 m hang from its top, 0.05 m off the axis, each with 5 kg at the end;
-    alpha1, alpha2 are their angles below the horizontal. Springs of 8e5 N/m with dampers of 4e4
-    N s/m and a free length of 0.5 m join their middles to the slider. Shaft and rods have 0.01 m x
-    0.01 m sections and, as the slider, 3000 kg/m^3. Gravity is along -z. It is assembled with
-    s = 0.5 m and both angles 30 degrees; the benchmark starts with `v0={"spin": 2 * pi}` [rad/s].
+    A shaft of 1 m length rotates about z by `spin`. A slider, a cube of 0.1 m, moves along the
+    shaft at the height `s` above its lower end. Two rods of 1 m length are attached to the top of
+    the shaft, 0.05 m off the axis, each with 5 kg at its end; alpha1 and alpha2 are their angles
+    below the horizontal. Springs of 8e5 N/m with dampers of 4e4 N s/m and a free length of 0.5 m
+    connect the middle of each rod to the slider. Shaft and rods have 0.01 m x 0.01 m sections; they
+    and the slider have a density of 3000 kg/m^3. Gravity is along -z. The mechanism is assembled
+    with s = 0.5 m and both angles 30 degrees; the benchmark starts with `v0={"spin": 2 * pi}`
+    [rad/s].
 
     Source: Gonzalez et al. 2006, problem A05.
     """

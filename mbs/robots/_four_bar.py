@@ -7,10 +7,11 @@ from mbs.mechanism import Mechanism
 
 
 def four_bar() -> Mechanism:
-    """Crank a, coupler b and rocker c of 0.4, 1.0 and 0.9 m on a ground of 0.8 m.
+    """Planar four-bar linkage: crank a, coupler b and rocker c of 0.4, 1.0 and 0.9 m.
 
-    The crank joint j1 is driven; gravity is along -y. It is assembled upright, near j2 = 1. The
-    boxes are of aluminium, 0.05 m wide and high. All values are illustrative.
+    The ground link has a length of 0.8 m. The joint j1 of the crank is driven; gravity is along -y.
+    The mechanism is assembled upright, near j2 = 1 rad. The boxes are of aluminium, 0.05 m wide and
+    high. All values are illustrative.
     """
     m = Mechanism(
         "four_bar",

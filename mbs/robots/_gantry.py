@@ -11,10 +11,10 @@ _SOURCE = "Illustrative gantry: dimensions, masses and inertias are invented"
 
 
 def gantry() -> Mechanism:
-    """Gantry: q1, q2, q3 slide along x, y and downwards; q4, q5, q6 turn a spherical wrist.
+    """Gantry robot: prismatic joints q1, q2, q3, and a spherical wrist q4, q5, q6.
 
-    Frame 6 is 120 mm below the centre of the wrist, with z down at zero. All values are
-    illustrative.
+    q1, q2 and q3 move along x, along y and downwards. Frame 6 is 120 mm below the centre of the
+    wrist, with its z axis downwards at zero. All values are illustrative.
     """
     half = pi / 2
     frames = [

@@ -14,10 +14,10 @@ _SOURCE = (
 
 
 def manseur_doty() -> Mechanism:
-    """Manseur and Doty's arm: six revolute joints; some poses have sixteen real configurations.
+    """Arm of Manseur and Doty: six revolute joints, up to sixteen real solutions.
 
-    Frame 6 is on the last joint; the last twist of the table, one degree about its x axis, belongs
-    to the hand and is left out.
+    Some poses of the hand are reached in sixteen real configurations. Frame 6 is on the last joint.
+    The last twist of the table, one degree about its x axis, belongs to the hand and is left out.
 
     Source: Manocha & Canny 1994, table I, the example of Wampler & Morgan 1991 after Manseur & Doty
     1989, as modified parameters. Masses and inertias are illustrative.

@@ -16,13 +16,14 @@ CRANK, ROCKER, ROD = (0, 0.5, 0.1), (0, 0.2, 0), (-1, 0.3, 0.1)
 
 
 def modelica_four_bar() -> Mechanism:
-    """Crank b1, massive connecting rod b3 and a rocker b2 that slides: six hinges, one slide.
+    """Spatial four-bar mechanism with six revolute joints and one prismatic joint.
 
-    j1 turns the crank about x in the origin; j2 slides the foot of b2 along x, from x = 1.2 m; rev
-    and rev1 about y and z carry the rod on it; j3, j4, j5 about x, y, z close the loop at the end
-    of the crank. All bars are steel cylinders of 0.05 m diameter; gravity is 9.80665 m/s^2 along
-    -y. It is assembled with j1 = 0, where j2 is -0.2 m and all angles are zero; the example
-    starts with 300 degrees/s, `v0={"j1": 5.235987755982989}`.
+    Joint j1 rotates the crank b1 about x at the origin. Joint j2 moves the lower end of the bar b2
+    along x, from x = 1.2 m. The joints rev and rev1 about y and z connect b2 with the massive
+    connecting rod b3. The joints j3, j4 and j5 about x, y and z close the loop at the end of the
+    crank. All bars are steel cylinders of 0.05 m diameter; gravity is 9.80665 m/s^2 along -y. The
+    mechanism is assembled with j1 = 0, j2 = -0.2 m and all other angles zero; the example starts
+    with 300 degrees/s, `v0={"j1": 5.235987755982989}`.
 
     Source: Modelica Standard Library, example Fourbar1; its loops: Otter et al. 2003.
     """

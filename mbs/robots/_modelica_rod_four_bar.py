@@ -16,10 +16,11 @@ _SOURCE = (
 
 
 def modelica_rod_four_bar() -> Mechanism:
-    """Crank b1 and rocker b2 as in `modelica_four_bar`, joined by a rod without mass.
+    """Spatial four-bar mechanism whose crank and slider are connected by a massless rod.
 
-    j1 turns the crank about x in the origin; j2 slides the foot of b2 along x, from x = 1.2 m. It
-    starts with 300 degrees/s, `v0={"j1": 5.235987755982989}`.
+    Joint j1 rotates the crank b1 about x at the origin. Joint j2 moves the lower end of the bar b2
+    along x, from x = 1.2 m. Both bars are those of `modelica_four_bar`. The example starts with 300
+    degrees/s, `v0={"j1": 5.235987755982989}`.
 
     Source: Modelica Standard Library, example Fourbar2.
     """

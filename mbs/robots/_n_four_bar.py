@@ -17,20 +17,22 @@ _SOURCE = (
 
 
 def n_four_bar(loops: int = 1) -> Mechanism:
-    """Four-bar windows in a row: uprights a0 .. aN on the ground, couplers between their tops.
+    """N four-bar linkages (windows) in a row, which share their upright rods.
 
-    All 2 N + 1 links are slender homogeneous rods of 1 m and 1 kg; gravity is along -y. Joint
-    a<k> turns upright k at (k, 0), joint b<k> coupler k on its top; the far end of coupler k
-    closes a loop in c<k>. One degree of freedom, and N + 1 where all rods lie on one line. It is
-    assembled upright; the benchmark starts with the tops at 1 m/s along x, `v0={"a0": -1}`.
+    The upright rods 0 .. N are at x = 0, 1, ..., N m on the ground, with couplers between their
+    tops. All 2 N + 1 links are slender homogeneous rods of 1 m and 1 kg; gravity is along -y. Joint
+    a<k> is at the lower end of upright k, joint b<k> between upright k and coupler k; the joint
+    c<k> at the far end of coupler k closes a loop. There is one degree of freedom, but N + 1 in the
+    singular configuration with all rods on one line. The mechanism is assembled upright; the
+    benchmark starts with the tops at 1 m/s along x, `v0={"a0": -1}`.
 
     Source: Gonzalez et al. 2006, problem A02, with N = 40; Bayo & Avello 1994, with N = 2.
 
     Args:
-        loops: number N of windows.
+        loops: number N of linkages.
 
     Raises:
-        DescriptionError: `loops` is not a whole number above zero.
+        DescriptionError: `loops` is not an integer above zero.
     """
     if isinstance(loops, bool) or not isinstance(loops, int) or loops < 1:
         raise DescriptionError(
@@ -51,8 +53,10 @@ def n_four_bar(loops: int = 1) -> Mechanism:
 
 
 def _rod(name: str) -> Body:
+    """Return a slender homogeneous rod of 1 m and 1 kg along x."""
     return Body(name, mass=1, com=(0.5, 0, 0), inertia=(0, 1 / 12, 1 / 12))
 
 
 def _hinge(name: str) -> Revolute:
+    """Return a passive revolute joint about z."""
     return Revolute(name, axis="z", actuated=False)

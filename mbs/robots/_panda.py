@@ -19,10 +19,10 @@ _GUESS = {"q4": -pi / 2, "q6": pi / 2}
 
 
 def panda() -> Mechanism:
-    """Franka Emika Panda: seven revolute joints, q1 .. q7, one more than a pose needs.
+    """Franka Emika Panda: seven revolute joints q1 .. q7, with one redundant joint.
 
-    Frame 7 is on the flange, 107 mm beyond the joint. The configuration of assembly lies within
-    the joint ranges, which the zero configuration does not.
+    Frame 7 is on the flange, 107 mm beyond the last joint. The assembled configuration lies within
+    the joint ranges, while the zero configuration does not.
 
     Source: modified Denavit-Hartenberg parameters and limits of joints published by Franka Emika.
     Masses, inertias and rotors are illustrative.

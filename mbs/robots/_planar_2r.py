@@ -9,9 +9,10 @@ _SOURCE = "Textbook arm; lengths, masses and inertias are illustrative"
 
 
 def planar_2r() -> Mechanism:
-    """Double pendulum with motors: q1, q2 about z, gravity along -y, both bars along x at zero.
+    """Planar arm (double pendulum with motors): revolute joints q1 and q2 about z.
 
-    Two homogeneous bars of 1 m and 1 kg, 0.05 m thick. Values are illustrative.
+    Gravity is along -y, and both bars are along x at zero. The bars are homogeneous, of 1 m length,
+    1 kg mass and 0.05 m thickness. All values are illustrative.
     """
     frames = [frame(0), frame(1, d=1)]
     bodies = [cuboid(j, 1, (1, 0.05, 0.05), (0.5, 0, 0)) for j in (1, 2)]

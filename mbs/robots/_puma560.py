@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from math import pi, radians
+from math import pi
 
 from mbs.mechanism import Mechanism
-from mbs.robots.rows import body, frame, robot
+from mbs.robots.rows import body, degrees, frame, robot
 
 _SOURCE = (
     "Armstrong, Khatib & Burdick 1986, The explicit dynamic model and inertial parameters of the"
@@ -15,24 +15,24 @@ _SOURCE = (
 
 
 def puma560() -> Mechanism:
-    """PUMA 560: six revolute joints, q1 .. q6, without friction.
+    """Unimation PUMA 560: six revolute joints q1 .. q6, without friction.
 
     Source: Armstrong, Khatib & Burdick 1986, tables of link geometry, masses, centres of mass,
-    diagonal inertias and motor inertias; link 3 without the wrist. The inertia of link 3 is put
-    in the axes of the link frame, small about y, along which the forearm lies. Its published
-    largest moment, 0.086 kg m^2, is more than any body with the other two can have; the largest
-    possible one, 0.0785, stands here, which is within the stated uncertainty. Of link 1 only the
-    moment about the joint axis was measured, and no other parameter of it has an effect. Joint
-    ranges: Fu, Gonzalez & Lee 1987.
+    diagonal inertias and motor inertias; link 3 without the wrist. The inertia of link 3 is
+    expressed in the axes of the link frame: it is small about y, along which the forearm lies. The
+    largest published moment of link 3, 0.086 kg m^2, is larger than physically possible with the
+    other two moments. It is replaced by the largest possible value, 0.0785 kg m^2, which is within
+    the published uncertainty. For link 1 only the moment about the joint axis was measured; its
+    other parameters have no effect. Joint ranges: Fu, Gonzalez & Lee 1987.
     """
     half = pi / 2
     frames = [
-        frame(0, limits=_degrees(-160, 160)),
-        frame(1, alpha=-half, r=0.2435, limits=_degrees(-225, 45)),
-        frame(2, d=0.4318, r=-0.0934, limits=_degrees(-45, 225)),
-        frame(3, alpha=half, d=-0.0203, r=0.4331, limits=_degrees(-110, 170)),
-        frame(4, alpha=-half, limits=_degrees(-100, 100)),
-        frame(5, alpha=half, limits=_degrees(-266, 266)),
+        frame(0, limits=degrees(-160, 160)),
+        frame(1, alpha=-half, r=0.2435, limits=degrees(-225, 45)),
+        frame(2, d=0.4318, r=-0.0934, limits=degrees(-45, 225)),
+        frame(3, alpha=half, d=-0.0203, r=0.4331, limits=degrees(-110, 170)),
+        frame(4, alpha=-half, limits=degrees(-100, 100)),
+        frame(5, alpha=half, limits=degrees(-266, 266)),
     ]
     bodies = [
         {"frame": 1, "ZZ": 0.35, "Ia": 1.14},
@@ -43,7 +43,3 @@ def puma560() -> Mechanism:
         body(6, 0.09, (0, 0, 0.032), (0.15e-3, 0.15e-3, 0.04e-3), Ia=0.193),
     ]
     return robot("puma560", _SOURCE, frames, bodies)
-
-
-def _degrees(low: float, high: float) -> list[float]:
-    return [radians(low), radians(high)]

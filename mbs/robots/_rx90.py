@@ -14,11 +14,11 @@ _SOURCE = (
 
 
 def rx90() -> Mechanism:
-    """Stäubli RX90: six revolute joints, q1 .. q6, spherical wrist.
+    """Stäubli RX90: six revolute joints q1 .. q6, with a spherical wrist.
 
     Source: geometry of Khalil & Dombre 2002, table 3.1, D3 = RL4 = 0.45 m. No complete inertial
-    data are published (only base parameters can be identified): masses, inertias, rotors and
-    friction are illustrative, those of homogeneous cuboids of the size of the links.
+    data are published, since only base parameters can be identified. Masses, inertias, rotors and
+    friction are illustrative: those of homogeneous cuboids of the size of the links.
     """
     half = pi / 2
     frames = [

@@ -12,10 +12,12 @@ _SOURCE = (
 
 
 def scara() -> Mechanism:
-    """SCARA robot: q1, q2, q3 revolute, q4 prismatic, all vertical, q4 positive upwards.
+    """SCARA robot: revolute joints q1, q2, q3 and prismatic joint q4, all vertical.
 
-    Source: frames of the SCARA example of Khalil & Dombre 2002, lengths of the AdeptOne (Adept
-    data sheet: 425 mm and 375 mm). Masses, inertias and rotors are illustrative.
+    A positive q4 moves upwards.
+
+    Source: frames of the SCARA example of Khalil & Dombre 2002, lengths of the AdeptOne (Adept data
+    sheet: 425 mm and 375 mm). Masses, inertias and rotors are illustrative.
     """
     frames = [
         frame(0),

@@ -11,9 +11,10 @@ _SOURCE = "Gonzalez, Dopico, Lugris & Cuadrado 2006, multibody benchmark library
 
 
 def simple_pendulum() -> Mechanism:
-    """Pendulum of 1 kg on a massless rod of 1 m; theta = 0 along x, gravity along -y.
+    """Pendulum of 1 kg on a massless rod of 1 m, with gravity along -y.
 
-    It is assembled, and starts at rest, with the mass at x = -1 m, y = 0.
+    The rod is along x at theta = 0. The mechanism is assembled with the mass at x = -1 m, y = 0,
+    where the benchmark starts at rest.
 
     Source: Gonzalez et al. 2006, problem A01.
     """

@@ -18,12 +18,13 @@ _WEB = (0.02, 0.1, 0.05)
 
 
 def single_cylinder_engine() -> Mechanism:
-    """Crankshaft about x, connecting rod and piston; the gas does not press.
+    """Mechanics of a one-cylinder engine: crankshaft, connecting rod and piston.
 
-    `crank` turns the shaft, which has a flywheel of 1 kg m^2; `cylinder` is the way of the piston
-    down from y = 0.45 m, `wrist` the angle of the rod on its pin; the loop is closed at the crank
-    pin. All parts are of steel; gravity is 9.80665 m/s^2 along -y. It is assembled with crank = 0,
-    the piston in its upper dead centre; the example starts with `v0={"crank": 10}` [rad/s].
+    There is no gas force. The joint `crank` rotates the shaft about x; its inertia includes a
+    flywheel of 1 kg m^2. The joint `cylinder` is the displacement of the piston downwards from y =
+    0.45 m, and `wrist` the angle of the connecting rod on its pin. The loop is closed at the crank
+    pin. All parts are of steel; gravity is 9.80665 m/s^2 along -y. The mechanism is assembled with
+    crank = 0 and the piston at top dead centre; the example starts with `v0={"crank": 10}` [rad/s].
 
     Source: Modelica Standard Library, example Engine1a.
     """

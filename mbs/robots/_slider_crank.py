@@ -13,12 +13,13 @@ _CRANK, _ROD = 0.15, 0.30
 
 
 def slider_crank() -> Mechanism:
-    """Crank of 0.15 m, driven in `crank`, rod of 0.3 m, slider along x by `slide`; no gravity.
+    """Planar slider-crank: crank of 0.15 m, rod of 0.3 m, slider along x, no gravity.
 
-    It is assembled stretched, crank and rod along x; slide is the distance from the crank's axis.
-    The published inertias are about the joints, j1 of the crank and j2 of the rod.
+    The joint `crank` is driven, and the joint `slide` is the distance of the slider from the axis
+    of the crank. The mechanism is assembled stretched, with crank and rod along x. The published
+    moments of inertia are about the joints, j1 of the crank and j2 of the rod.
 
-    Source: Simeon 1996; Mazzia & Magherini 2008, whose rod bends.
+    Source: Simeon 1996; Mazzia & Magherini 2008, with a flexible rod. Here the rod is rigid.
     """
     guess = {"crank": 0.0, "rod": 0.0, "slide": _CRANK + _ROD}
     m = Mechanism("slider_crank", gravity=(0, 0, 0), source=_SOURCE, guess=guess)
@@ -35,5 +36,9 @@ def slider_crank() -> Mechanism:
 
 
 def _bar(name: str, mass: float, length: float, about_joint: float) -> Body:
+    """Return a homogeneous bar from its reference frame along x.
+
+    `mass` in [kg], `length` in [m], moment of inertia `about_joint` about its end in [kg m^2].
+    """
     about_com = about_joint - mass * length**2 / 4
     return Body(name, mass=mass, com=(length / 2, 0, 0), inertia=(0, about_com, about_com))

@@ -15,14 +15,14 @@ _D2, _D3, _D4, _RL4, _D8 = 0.4, 0.8, -0.2, 1.0, 0.3
 
 
 def sr400() -> Mechanism:
-    """SR400: eight links, nine revolute joints, one parallelogram (links 2, 3, 7, 8).
+    """SR400: eight links, nine revolute joints, one parallelogram of links 2, 3, 7, 8.
 
-    Actuated are q1, q2, q4, q5, q6 and q7; the loop is opened at q9. It is closed where
-    q3 = pi/2 - q2 + q7, q8 = q2 - q7 and q9 = pi - q8, and singular where q2 = q7, as at the zero
-    configuration; it is assembled at q2 = -pi/2, the arm upright.
+    The joints q1, q2, q4, q5, q6 and q7 are actuated, and the loop is cut at q9. It is closed if q3
+    = pi/2 - q2 + q7, q8 = q2 - q7 and q9 = pi - q8. It is singular at q2 = q7, for example at the
+    zero configuration. The mechanism is assembled at q2 = -pi/2, with the arm upright.
 
-    Source: frames of Khalil & Dombre 2002, section 7 (after Khalil & Kleinfinger 1986), d2 = d7,
-    d9 = d3, d10 = -d8, gamma10 = pi/2. Lengths, masses and inertias are illustrative.
+    Source: frames of Khalil & Dombre 2002, section 7 (after Khalil & Kleinfinger 1986), d2 = d7, d9
+    = d3, d10 = -d8, gamma10 = pi/2. Lengths, masses and inertias are illustrative.
     """
     half = pi / 2
     frames = [

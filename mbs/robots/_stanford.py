@@ -18,12 +18,12 @@ _SOURCE = (
 def stanford() -> Mechanism:
     """Stanford arm: joints q1, q2 revolute, q3 prismatic, q4 .. q6 revolute.
 
-    Source: lengths 0.412 and 0.154 m from Paul 1972 (AIM-177, figure 2.3); masses, centres of
-    mass, inertias and rotor inertias from Paul 1981, tables 6.4 to 6.6. The inertias of Paul are
-    about the origins of his standard Denavit-Hartenberg frames, which lie on the next joint, and
-    his centres of mass are in centimetres: only so does every link have a possible inertia. They
-    are turned here into the modified frames, which have the same origins. The tool plate is
-    0.263 m from the wrist; the constant turn of -pi/2 in joint 3 of Paul is part of q4 here.
+    Source: lengths 0.412 and 0.154 m from Paul 1972 (AIM-177, figure 2.3); masses, centres of mass,
+    inertias and rotor inertias from Paul 1981, tables 6.4 to 6.6. Paul's inertias are interpreted
+    as moments about the origins of his standard Denavit-Hartenberg frames, which lie on the next
+    joint, and his centres of mass as centimetres; only then is every inertia physically possible.
+    Both are rotated here into the modified frames, which have the same origins. The tool plate is
+    0.263 m from the wrist. The constant rotation of -pi/2 in joint 3 of Paul is part of q4 here.
     """
     half = pi / 2
     frames = [
@@ -53,7 +53,11 @@ def _link(
     moments: tuple[float, float, float],
     Ia: float,
 ) -> Row:
-    """A link by its data in a standard frame, which is turned by the twist about x."""
+    """Return the row of a link from its data in a standard Denavit-Hartenberg frame.
+
+    The modified frame has the same origin, and the standard frame is rotated by `twist` [rad] about
+    its x axis. Units: kg, m, kg m^2; `Ia` is the rotor inertia of the joint.
+    """
     c, s = round(cos(twist)), round(sin(twist))
     R = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
     turned = R @ np.array(com)

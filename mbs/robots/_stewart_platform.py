@@ -26,12 +26,14 @@ Points = NDArray[np.float64]
 
 
 def stewart_platform() -> Mechanism:
-    """Platform on six legs, each a universal joint, a motor `leg<k>` and a spherical joint.
+    """Gough-Stewart platform on six legs with one prismatic motor each.
 
-    The lower joints lie in pairs on a circle of 0.6 m radius, the upper ones on one of 0.3 m,
-    pairs facing gaps; the platform is assembled level, 0.7 m above the base. There all
-    coordinates of the legs are zero: leg<k> is the lengthening of leg k from that configuration.
-    The frame `platform` is in the middle of the upper circle.
+    Each leg has a universal joint at the base, the actuated prismatic joint leg1 .. leg6, and a
+    spherical joint at the platform. The lower joints lie in pairs on a circle of 0.6 m radius, the
+    upper joints in pairs on a circle of 0.3 m, with each upper pair between two lower pairs. The
+    platform is assembled level, 0.7 m above the base. In this configuration all coordinates of the
+    legs are zero: leg<k> is the extension of leg k from there. The frame `centre` is in the middle
+    of the upper circle.
 
     Source: structure of Gough & Whitehall 1962 and Stewart 1965. Lengths, masses and inertias are
     illustrative.
@@ -56,7 +58,11 @@ def stewart_platform() -> Mechanism:
 
 
 def leg_ends() -> tuple[Points, Points]:
-    """Lower and upper ends of the legs at the assembled configuration, (6, 3) each [m]."""
+    """Return the lower and upper ends of the six legs in the assembled configuration.
+
+    Returns:
+        Two arrays (6, 3) of positions in the base frame [m].
+    """
     thirds = np.repeat(2 * pi / 3 * np.arange(3), 2)
     sides = np.tile([-1.0, 1.0], 3)
     low, high = thirds + sides * (pi / 3 - _HALF_ANGLE), thirds + sides * _HALF_ANGLE
@@ -64,10 +70,15 @@ def leg_ends() -> tuple[Points, Points]:
 
 
 def _circle(radius: float, angles: Points, height: float) -> Points:
+    """Return points (k, 3) on a horizontal circle, with `radius` and `height` in [m].
+
+    Their positions on the circle are the `angles` (k,) [rad].
+    """
     heights = np.full(len(angles), height)
     return np.column_stack([radius * np.cos(angles), radius * np.sin(angles), heights])
 
 
 def _tube(name: str, mass: float, com: tuple[float, float, float], length: float) -> Body:
+    """Return a slender tube along z of the given length [m]; `com` is its centre of mass [m]."""
     across = mass * length**2 / 12
     return Body(name, mass=mass, com=com, inertia=(across, across, 5e-4 * mass))

@@ -11,9 +11,10 @@ _SOURCE = "Illustrative tree: dimensions, masses and inertias are invented"
 
 
 def two_branch_tree() -> Mechanism:
-    """A turning trunk (q1) with an arm on either side: q2 .. q4 and q5 .. q7.
+    """Rotating trunk q1 with two arms: q2 .. q4, and q5 .. q7.
 
-    The last joint of the first arm slides. All values are illustrative.
+    Joint q4, the last of the first arm, is prismatic; the others are revolute. All values are
+    illustrative.
     """
     half = pi / 2
     frames = [

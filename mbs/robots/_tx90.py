@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from math import pi, radians
+from math import pi
 
 from mbs.mechanism import Mechanism
-from mbs.robots.rows import cuboid, frame, robot
+from mbs.robots.rows import cuboid, degrees, frame, robot
 
 _SOURCE = (
     "Geometry and joint ranges: Stäubli data sheet of the TX90, 50, 425, 425, 100 and 478 mm;"
@@ -14,21 +14,22 @@ _SOURCE = (
 
 
 def tx90() -> Mechanism:
-    """Stäubli TX90: six revolute joints, q1 .. q6, spherical wrist, upper arm aside by 50 mm.
+    """Stäubli TX90: six revolute joints q1 .. q6, with a spherical wrist.
 
-    At zero the arm stands upright and frame 6, on the flange, has the axes of the base.
+    The upper arm is offset sideways by 50 mm. At zero the arm is upright, and frame 6, which is on
+    the flange, has the orientation of the base.
 
     Source: lengths and joint ranges of the Stäubli data sheet of the TX90. Masses, inertias and
     rotors are illustrative.
     """
     half = pi / 2
     frames = [
-        frame(0, r=0.478, limits=_degrees(-180, 180)),
-        frame(1, alpha=-half, d=0.05, theta=-half, limits=_degrees(-130, 147.5)),
-        frame(2, d=0.425, theta=half, r=0.05, limits=_degrees(-145, 145)),
-        frame(3, alpha=half, r=0.425, limits=_degrees(-270, 270)),
-        frame(4, alpha=-half, limits=_degrees(-115, 140)),
-        frame(5, alpha=half, r=0.1, limits=_degrees(-270, 270)),
+        frame(0, r=0.478, limits=degrees(-180, 180)),
+        frame(1, alpha=-half, d=0.05, theta=-half, limits=degrees(-130, 147.5)),
+        frame(2, d=0.425, theta=half, r=0.05, limits=degrees(-145, 145)),
+        frame(3, alpha=half, r=0.425, limits=degrees(-270, 270)),
+        frame(4, alpha=-half, limits=degrees(-115, 140)),
+        frame(5, alpha=half, r=0.1, limits=degrees(-270, 270)),
     ]
     bodies = [
         cuboid(1, 30, (0.3, 0.3, 0.3), (0.02, 0, -0.1), Ia=1.5),
@@ -39,7 +40,3 @@ def tx90() -> Mechanism:
         cuboid(6, 0.5, (0.06, 0.06, 0.05), (0, 0, -0.03), Ia=0.1),
     ]
     return robot("tx90", _SOURCE, frames, bodies)
-
-
-def _degrees(low: float, high: float) -> list[float]:
-    return [radians(low), radians(high)]

@@ -15,9 +15,10 @@ _TURNS = [-2 * pi, 2 * pi]
 
 
 def ur5() -> Mechanism:
-    """Universal Robots UR5: six revolute joints, q1 .. q6, axes 2, 3 and 4 parallel.
+    """Universal Robots UR5: six revolute joints q1 .. q6, without a spherical wrist.
 
-    At zero the arm is stretched along -x of the base. Frame 6 is on the flange.
+    The axes 2, 3 and 4 are parallel. At zero the arm is stretched along -x of the base. Frame 6 is
+    on the flange.
 
     Source: Denavit-Hartenberg parameters published by Universal Robots for the UR5, as modified
     parameters. Masses, inertias and rotors are illustrative.

@@ -18,13 +18,16 @@ _REAR, _FRONT = 0.3, 0.35
 
 
 def whipple_bicycle() -> Mechanism:
-    """A bicycle and its rigid rider, upright on the plane z = 0; x points ahead and z down.
+    """Whipple bicycle with a rigid rider, upright on the plane z = 0.
 
-    The rear frame moves by x, y, z, yaw, lean and pitch at the rear hub; the front frame steers
-    about an axis tilted by 18 degrees that meets the ground 0.08 m before the front contact, the
-    trail. Lean and steer have torques, and so has the rear wheel. Running straight ahead at the
-    speed V, the rear wheel turns at -V / 0.3 rad/s. Its weave becomes stable at 4.29 m/s, and its
-    capsize unstable at 6.02 m/s.
+    The x axis points ahead and z downwards. The wheels are discs that roll without slipping. The
+    rear frame moves by x, y, z, yaw, lean and pitch at the rear hub. The front frame steers about
+    an axis that is tilted by 18 degrees and meets the ground 0.08 m ahead of the front contact
+    point; this distance is the trail. The joints lean, steer and rear_spin are actuated. At the
+    forward speed V straight ahead, the rear wheel rotates at -V / 0.3 rad/s. The weave mode becomes
+    stable at 4.29 m/s, and the capsize mode unstable at 6.02 m/s.
+
+    Source: Meijaard, Papadopoulos, Ruina & Schwab 2007, table 1.
     """
     m = Mechanism(
         "whipple_bicycle",
@@ -54,7 +57,7 @@ def whipple_bicycle() -> Mechanism:
 
 
 def _base_joints() -> list[Prismatic | Revolute]:
-    """How the rear hub moves: along the axes, then about the normal, the heading and the axle."""
+    """Return the joints of the rear hub in series: x, y, z, yaw, lean (actuated) and pitch."""
     slides = [Prismatic(axis, axis=axis, actuated=False) for axis in "xyz"]
     return [
         *slides,
@@ -65,7 +68,7 @@ def _base_joints() -> list[Prismatic | Revolute]:
 
 
 def _rear_frame() -> Body:
-    """Frame and rider, about the rear hub."""
+    """Return the rear frame with the rider; its reference frame is at the rear hub."""
     return Body(
         "rear_frame",
         mass=85.0,
@@ -75,7 +78,7 @@ def _rear_frame() -> Body:
 
 
 def _front_frame() -> Body:
-    """Handlebar and fork, about the point where the steering axis meets the ground."""
+    """Return handlebar and fork, with the origin where the steering axis meets the ground."""
     return Body(
         "front_frame",
         mass=4.0,
@@ -85,4 +88,9 @@ def _front_frame() -> Body:
 
 
 def _wheel(name: str, mass: float, across: float, spin: float) -> Body:
+    """Return a wheel with its axle along y.
+
+    `mass` is in kg; `across` and `spin` are the moments of inertia about a diameter and about the
+    axle [kg m^2].
+    """
     return Body(name, mass=mass, inertia=(across, spin, across))

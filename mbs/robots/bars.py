@@ -13,7 +13,14 @@ Vector = tuple[float, float, float]
 
 
 def round_bar(name: str, r: Vector, diameter: float, density: float) -> Body:
-    """A round bar from the reference frame to r [m]; diameter [m], density [kg/m^3]."""
+    """Return a homogeneous round bar between two points.
+
+    Args:
+        name: name of the body.
+        r: vector from the origin of the reference frame, where the bar begins, to its end [m].
+        diameter: diameter [m].
+        density: density [kg/m^3].
+    """
     along = np.array(r)
     length, radius = math.hypot(*r), diameter / 2
     mass = density * pi * radius**2 * length
@@ -24,7 +31,14 @@ def round_bar(name: str, r: Vector, diameter: float, density: float) -> Body:
 
 
 def square_bar(name: str, r: Vector, sides: Vector, density: float) -> Body:
-    """A cuboid with its middle at r / 2 [m] and these sides along x, y, z [m]."""
+    """Return a homogeneous cuboid with its centre at r / 2.
+
+    Args:
+        name: name of the body.
+        r: twice the vector from the origin of the reference frame to the centre [m].
+        sides: lengths along x, y, z of the reference frame [m].
+        density: density [kg/m^3].
+    """
     x, y, z = (side**2 for side in sides)
     mass = density * float(np.prod(sides))
     inertia = tuple(mass * square / 12 for square in (y + z, x + z, x + y))

@@ -34,7 +34,8 @@ _URDF, _SDF, _MJCF = (".urdf", ".xacro"), (".sdf", ".world"), ".xml"
 def catalogue() -> Mapping[str, Callable[[], Mechanism]]:
     """Return the functions that build the mechanisms of the catalogue, by name.
 
-    The module `_name` of this package contains the function `name`.
+    Each function has default values for its arguments. The module `_name` of this package contains
+    the function `name`.
     """
     modules = (module.name for module in iter_modules([str(Path(__file__).parent)]))
     names = sorted(module[1:] for module in modules if module.startswith("_"))
@@ -115,7 +116,10 @@ def load(
 
 
 def _joint_names(mechanism: Mechanism, lock: Mapping[str, Any]) -> dict[str, Any]:
-    """Positions by the names of joints here; names may be written as in the file."""
+    """Return the positions of `lock` by component name; names may be spelt as in the file.
+
+    Raise a DescriptionError if `lock` is not a dict.
+    """
     if not isinstance(lock, Mapping):
         raise DescriptionError(
             f"{mechanism.name}: lock is {quoted(lock)}; give a dict of joints to positions"
@@ -133,6 +137,10 @@ def _mechanism(
     xacro: Mapping[str, object] | None,
     packages: Mapping[str, str | Path] | None,
 ) -> Mechanism:
+    """Return the mechanism of a name, dict or file; see `load` for the arguments.
+
+    Raise a DescriptionError if the source is of no known kind.
+    """
     if isinstance(source, Mapping):
         return to_mechanism(from_dict(source))
     if isinstance(source, str) and source in catalogue():

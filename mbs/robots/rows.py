@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import radians
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,13 @@ Row = dict[str, Any]
 
 
 def frame(antecedent: int, joint: str = "revolute", **values: Any) -> Row:
-    """A frame row; values are Khalil parameters [rad, m], limits, actuated, name."""
+    """Return a frame row of a table (see `FrameRow`).
+
+    Args:
+        antecedent: number of the antecedent frame, 0 for the base.
+        joint: "revolute", "prismatic" or "fixed".
+        **values: Khalil parameters [rad, m], limits [rad or m], velocity, effort, actuated, name.
+    """
     return {"antecedent": antecedent, "joint": joint, **values}
 
 
@@ -44,7 +51,15 @@ def body(
 
 
 def about_origin(number: int, mass: float, com: Sequence[float], J: Any, **values: Any) -> Row:
-    """Return the row of a body from its inertia J (3, 3) about the origin of its frame [kg m^2]."""
+    """Return the row of a body from its inertia about the origin of its frame.
+
+    Args:
+        number: number of the frame on which the body is fixed.
+        mass: mass [kg].
+        com: centre of mass in that frame [m].
+        J: inertia (3, 3) about the origin of the frame, in its axes [kg m^2].
+        **values: further entries of the row: Ia, Fv, Fs, name.
+    """
     keys = ("XX", "XY", "XZ", "YY", "YZ", "ZZ", "MX", "MY", "MZ", "M")
     elements = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
     ten = [*(float(J[k, m]) for k, m in elements), *(mass * float(x) for x in com), mass]
@@ -54,7 +69,7 @@ def about_origin(number: int, mass: float, com: Sequence[float], J: Any, **value
 def cuboid(
     number: int, mass: float, sides: Sequence[float], com: Sequence[float], **values: Any
 ) -> Row:
-    """Return the row of a homogeneous cuboid along the axes of its frame.
+    """Return the row of a homogeneous cuboid whose sides are parallel to the axes of its frame.
 
     Args:
         number: number of the frame on which the body is fixed.
@@ -69,6 +84,19 @@ def cuboid(
 
 
 def robot(name: str, source: str, frames: list[Row], bodies: list[Row], **values: Any) -> Mechanism:
-    """The mechanism of a table; values are loop, guess and gravity."""
+    """Return the mechanism of a table of frames.
+
+    Args:
+        name: name of the robot.
+        source: origin of the data.
+        frames: rows of the frames 1, 2, ...; see `frame`.
+        bodies: rows of the bodies; see `body`.
+        **values: further entries of the table: loop, guess, gravity.
+    """
     table = {"name": name, "source": source, "frame": frames, "body": bodies, **values}
     return to_mechanism(from_dict(table))
+
+
+def degrees(low: float, high: float) -> list[float]:
+    """Return the limits (low, high) of a revolute joint in radians, from degrees."""
+    return [radians(low), radians(high)]

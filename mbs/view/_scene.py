@@ -91,7 +91,7 @@ class Scene:
     notes: tuple[str, ...] = ()
 
     def hidden(self, left_out: Collection[str] = ()) -> tuple[str, ...]:
-        """Return the roles that are hidden by default.
+        """Return the roles that a viewer hides by default.
 
         Args:
             left_out: further roles to hide. If it contains "visual", bars and joints are shown.
@@ -120,17 +120,32 @@ class Scene:
         return flat
 
     def motion(self, q: Array) -> Array:
-        """Return the poses (n, 12 links), as in `poses`, at configurations q (n, nq)."""
+        """Return the poses of base and links along a motion.
+
+        Args:
+            q: configurations (n, nq), one per row [rad or m].
+
+        Returns:
+            Poses (n, 12 (links + 1)); each row has the numbers that `poses` returns.
+        """
         p = self._values(None)
         return pose_rows(self.system, np.transpose(q), p).T
 
     def _values(self, parameters: Mapping[str, float] | None) -> list[float]:
+        """Return the values of all parameters of the system.
+
+        `parameters` override those of the scene.
+        """
         values = {**self.parameters, **(parameters or {})}
         return self.system.parameter_values(values, picture_symbols(self.system))
 
     def spanning(self, q: Array) -> Scene:
-        """Return a copy with bounds and ground for all configurations q (n, nq)."""
-        marks = _marks(self.primitives)
+        """Return a copy with bounds and ground for all configurations of a motion.
+
+        Args:
+            q: configurations (n, nq), one per row [rad or m].
+        """
+        marks = _bounding_points(self.primitives)
         poses = self.motion(q).reshape(len(q), -1, 3, 4)
         points = np.vstack([poses[:, k, :, :3] @ at + poses[:, k, :, 3] for k, at in marks])
         up, radius = np.array(self.up), self.bounds.radius
@@ -140,11 +155,15 @@ class Scene:
         return replace(self, bounds=bounds, floor=floor_of(np.vstack([points, ground]), up, bounds))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the scene as a dict that can be converted to JSON."""
+        """Return the scene as a dict of names, numbers and lists that can be converted to JSON.
+
+        It contains shapes, poses, bounds, ground, views, hidden roles and the palette of colours,
+        for a viewer in a browser.
+        """
         return {
             "name": self.system.name,
             "links": list(self.links),
-            "primitives": [_plain(item) for item in self.primitives],
+            "primitives": [_primitive_data(item) for item in self.primitives],
             "poses": self.poses(),
             "up": list(self.up),
             "size": self.size,
@@ -193,7 +212,7 @@ def scene(
             f"{system.name}: a point of the picture is not finite; check the values of the symbols"
         )
     bounds = bounds_of(points, _MARGIN * sizes.frame)
-    floor = floor_of(points, at.up, bounds, _gap(at.system) * sizes.joint)
+    floor = floor_of(points, at.up, bounds, _ground_clearance(at.system) * sizes.joint)
     level = float(np.array(floor.center) @ at.up)
     primitives = (
         *base_shapes(at, sizes, level, seen),
@@ -222,21 +241,25 @@ def scene(
     )
 
 
-def _gap(system: System) -> float:
-    """Return the height of the mechanism above the ground in joint radii.
+def _ground_clearance(system: System) -> float:
+    """Return the height of the mechanism above the ground, in radii of a revolute joint.
 
-    It is zero with wheels or a free joint.
+    It is 0 for mechanisms with wheels or a free joint, and 4 otherwise.
     """
     kinds = {joint.kind for joint in system.joints}
     return 0.0 if kinds & {"rollingdisc", "free"} else 4.0
 
 
-def _plain(item: Primitive) -> dict[str, Any]:
+def _primitive_data(item: Primitive) -> dict[str, Any]:
+    """Return a primitive as a dict of its fields and of its kind, such as "bar"."""
     return {"kind": type(item).__name__.removesuffix("Shape").lower(), **asdict(item)}
 
 
-def _marks(primitives: tuple[Primitive, ...]) -> list[tuple[int, Array]]:
-    """Return link and point of shapes, from which the bounds of a motion are computed."""
+def _bounding_points(primitives: tuple[Primitive, ...]) -> list[tuple[int, Array]]:
+    """Return (link number, point in the link frame [m]) of the primitives.
+
+    The bounds of a motion are computed from these points.
+    """
     found: list[tuple[int, Array]] = []
     for item in primitives:
         if isinstance(item, (BarShape, CylinderShape)):

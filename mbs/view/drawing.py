@@ -75,7 +75,14 @@ class Stroke:
 
 @dataclass(frozen=True, slots=True)
 class Name:
-    """Text at a point, in a colour of the palette. After `placed`, the point is its lower left."""
+    """Text at a point of a drawing.
+
+    Attributes:
+        colour: name in the palette.
+        text: text.
+        point: point to which the text belongs; in a finished drawing the lower left corner of the
+            text. In drawing units, y upwards.
+    """
 
     colour: str
     text: str
@@ -97,7 +104,10 @@ class Drawing:
     caption: str = ""
 
     def bounds(self) -> tuple[float, float, float, float]:
-        """Return left, lower, right and upper bound of the strokes, or a unit square if none."""
+        """Return left, lower, right and upper bound of the strokes in drawing units.
+
+        A drawing without strokes has the bounds of a unit square.
+        """
         points = [point for stroke in self.strokes for point in stroke.points]
         if not points:
             return 0.0, 0.0, 1.0, 1.0
@@ -106,7 +116,7 @@ class Drawing:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Eye:
+class _OrthographicView:
     """Orthographic view of posed links.
 
     Attributes:
@@ -122,11 +132,19 @@ class _Eye:
     scale: float = 1.0
 
     def seen(self, points: Array) -> Array:
-        """Project points (..., 3) in the base frame to right, up, near (..., 3), drawing units."""
+        """Project points of the base frame to the drawing.
+
+        `points` are (..., 3) [m]; the result (..., 3) is (right, up, towards the viewer) in drawing
+        units.
+        """
         return np.array(self.scale * (points @ self.axes.T))
 
     def project(self, link: int, points: Sequence[Vector] | Vector | Array) -> Array:
-        """Project points (..., 3) in a link frame to right, up, near (..., 3), drawing units."""
+        """Project points of a link frame to the drawing.
+
+        `points` are (..., 3) [m]; the result (..., 3) is (right, up, towards the viewer) in drawing
+        units.
+        """
         R, p = self.poses[link, :, :3], self.poses[link, :, 3]
         return self.seen(np.array(points) @ R.T + p)
 
@@ -144,11 +162,11 @@ def drawing(
         parameters: values of symbols. Other symbols have their default values.
 
     Raises:
-        ModelError: the same errors as of `scene`.
+        ModelError: `system` is not a System, a name is unknown, or a symbol has no value.
     """
     made = scene(system, q, parameters=parameters)
     at = pose_links(system, made.q, made.parameters)
-    eye = _eye(at, np.array(made.views["iso"]))
+    eye = _view(at, np.array(made.views["iso"]))
     # draw links as bars, also if they have visual shapes
     out = made.hidden(("visual",))
     shapes = [
@@ -160,15 +178,16 @@ def drawing(
     ]
     flat = np.vstack([np.reshape(s.points, (-1, 2)) for s in _strokes(shapes, eye)])
     extent = float(np.ptp(flat, axis=0).max())
-    eye = _Eye(eye.axes, eye.caption, eye.poses, _SIZE / extent)
+    eye = _OrthographicView(eye.axes, eye.caption, eye.poses, _SIZE / extent)
     strokes = [*_grounds(at, eye), *_strokes(shapes, eye), *_masses(at, eye)]
     return Drawing(tuple(strokes), placed(_names(at, eye)), eye.caption)
 
 
-def _eye(at: PosedLinks, iso: Array) -> _Eye:
+def _view(at: PosedLinks, iso: Array) -> _OrthographicView:
     """Return the view along the normal of the plane of motion, or from `iso` if it is spatial.
 
-    In the plane, positive directions point to the right and upwards.
+    `iso` is the unit vector (3,) towards the viewer in the base frame. In the plane, positive
+    directions point to the right and upwards.
     """
     normal = plane_normal(at)
     prismatic_axes = [
@@ -180,7 +199,7 @@ def _eye(at: PosedLinks, iso: Array) -> _Eye:
     if normal is None or any(abs(float(along @ normal)) > _PARALLEL for along in prismatic_axes):
         right = np.cross(at.up, iso) / np.linalg.norm(np.cross(at.up, iso))
         axes = np.array([right, np.cross(iso, right), iso])
-        return _Eye(axes, "seen from above at an angle", at.poses)
+        return _OrthographicView(axes, "seen from above at an angle", at.poses)
     up = at.up - normal * (at.up @ normal)
     if np.linalg.norm(up) < _PARALLEL:  # the plane is level
         up = np.eye(3)[1] if abs(normal[1]) < 0.5 else np.eye(3)[2]
@@ -189,11 +208,11 @@ def _eye(at: PosedLinks, iso: Array) -> _Eye:
     right = np.cross(up, normal)
     right = right * np.sign(right[np.argmax(np.abs(right))])
     axes = np.array([right, up, np.cross(right, up)])
-    return _Eye(axes, "in the plane of the motion", at.poses)
+    return _OrthographicView(axes, "in the plane of the motion", at.poses)
 
 
-def _strokes(shapes: Iterable[Primitive], eye: _Eye) -> Iterator[Stroke]:
-    """Yield the strokes of all shapes by role, and from far to near within a role."""
+def _strokes(shapes: Iterable[Primitive], eye: _OrthographicView) -> Iterator[Stroke]:
+    """Yield the strokes of all shapes ordered by role, and from far to near within a role."""
     drawn = []
     for item in shapes:
         group = _ORDER.index("joint" if item.role == "loop" else item.role)
@@ -203,8 +222,8 @@ def _strokes(shapes: Iterable[Primitive], eye: _Eye) -> Iterator[Stroke]:
         yield from parts
 
 
-def _parts(item: Primitive, eye: _Eye) -> tuple[list[Stroke], float]:
-    """Return the strokes of a shape and the depth of its middle, larger if nearer."""
+def _parts(item: Primitive, eye: _OrthographicView) -> tuple[list[Stroke], float]:
+    """Return the strokes of a shape and its depth, the coordinate towards the viewer."""
     if isinstance(item, (SpanShape, SpringShape)):
         start, end = (eye.project(k, at) for k, at in zip(item.links, item.ends, strict=True))
         middle = float((start + end)[2]) / 2
@@ -233,7 +252,7 @@ def _parts(item: Primitive, eye: _Eye) -> tuple[list[Stroke], float]:
         line = Stroke(item.role, item.colour, _path(points), closed=True, width=tube)
         return [line], float(points[:, 2].mean())
     if isinstance(item, FrameShape):
-        return _tripod(item, eye)
+        return _frame_axes(item, eye)
     assert isinstance(item, AxisShape), f"{type(item).__name__} has no strokes"
     ends = list(eye.project(item.link, (item.a, item.b)))
     # thin line (drawing units); no line for an axis along the view direction
@@ -243,16 +262,21 @@ def _parts(item: Primitive, eye: _Eye) -> tuple[list[Stroke], float]:
 
 
 def _area(item: Primitive, points: Array, opacity: float = 1.0, bright: float = 1.0) -> Stroke:
+    """Return a polygon with corners `points` (k, 2 or 3), in role and colour of a primitive.
+
+    `bright` is its brightness relative to the colour.
+    """
     path = _path(points)
     return Stroke(item.role, item.colour, path, closed=True, opacity=opacity, bright=bright)
 
 
 def _capsule(ends: Sequence[Array], radius: float) -> Array:
+    """Return the outline (k, 2) of a bar with round ends: convex hull of circles about its ends."""
     return hull(np.vstack([end[:2] + radius * _CIRCLE[:, :2] for end in ends]))
 
 
-def _cylinder(item: CylinderShape, eye: _Eye) -> tuple[list[Stroke], float]:
-    """Return the outline of a cylinder, its visible end and the bore, and its depth."""
+def _cylinder(item: CylinderShape, eye: _OrthographicView) -> tuple[list[Stroke], float]:
+    """Return the outline of a cylinder, its visible end face and bore, and its depth."""
     a, b = np.array(item.a), np.array(item.b)
     across = _CIRCLE @ rotation_onto(b - a).T
     rings = [eye.project(item.link, end + item.radius * across) for end in (a, b)]
@@ -269,8 +293,8 @@ def _cylinder(item: CylinderShape, eye: _Eye) -> tuple[list[Stroke], float]:
     return parts, float(sum(heads)) / 2
 
 
-def _box(item: BoxShape, eye: _Eye) -> tuple[list[Stroke], float]:
-    """Return the visible faces of a box and its depth."""
+def _box(item: BoxShape, eye: _OrthographicView) -> tuple[list[Stroke], float]:
+    """Return the visible faces of a box, and its depth."""
     pose = np.array(item.pose).reshape(3, 4)
     local = BOX_CORNERS * np.array(item.size) @ pose[:, :3].T + pose[:, 3]
     corners = eye.project(item.link, local)
@@ -285,8 +309,8 @@ def _box(item: BoxShape, eye: _Eye) -> tuple[list[Stroke], float]:
     return parts, float(corners[:, 2].mean())
 
 
-def _tripod(item: FrameShape, eye: _Eye) -> tuple[list[Stroke], float]:
-    """Return the axes of a frame, except an axis that points to the eye, and its depth."""
+def _frame_axes(item: FrameShape, eye: _OrthographicView) -> tuple[list[Stroke], float]:
+    """Return the axes of a frame except an axis that points to the viewer, and its depth."""
     pose = np.array(item.pose).reshape(3, 4)
     ends = pose[:, 3] + item.length * pose[:, :3].T
     points = eye.project(item.link, np.vstack([pose[:, 3], ends]))
@@ -300,7 +324,10 @@ def _tripod(item: FrameShape, eye: _Eye) -> tuple[list[Stroke], float]:
 
 
 def _coil(item: SpringShape, start: Array, end: Array, radius: float) -> Stroke:
-    """Return a spring as a zigzag, or as a line if its ends coincide in the drawing."""
+    """Return a spring between two projected points as a zigzag of half width `radius`.
+
+    It is a line if `start` and `end` (3,) coincide in the drawing. Lengths are in drawing units.
+    """
     start, along = start[:2], (end - start)[:2]
     length = float(np.linalg.norm(along))
     # length below 1e-9 drawing units is rounding; straight ends of 3/20 of the length and eight
@@ -314,7 +341,7 @@ def _coil(item: SpringShape, start: Array, end: Array, radius: float) -> Stroke:
     return Stroke(item.role, item.colour, _path(np.array(points)), width=0.8)
 
 
-def _grounds(at: PosedLinks, eye: _Eye) -> Iterator[Stroke]:
+def _grounds(at: PosedLinks, eye: _OrthographicView) -> Iterator[Stroke]:
     """Yield a hatched ground line under every end of a force element on the base."""
     # lengths in drawing units
     for force in at.parts.forces:
@@ -326,7 +353,8 @@ def _grounds(at: PosedLinks, eye: _Eye) -> Iterator[Stroke]:
                     yield Stroke("base", "base", ((head, y), (head - 1.4, y - 1.8)))
 
 
-def _masses(at: PosedLinks, eye: _Eye) -> Iterator[Stroke]:
+def _masses(at: PosedLinks, eye: _OrthographicView) -> Iterator[Stroke]:
+    """Yield a dot at the centre of mass of every link."""
     for link in at.parts.links:
         if link.mass_centre is not None:
             # dot with a diameter of 1.6 drawing units
@@ -334,7 +362,9 @@ def _masses(at: PosedLinks, eye: _Eye) -> Iterator[Stroke]:
             yield Stroke("mass", "text", _path(dot), closed=True, opacity=1.0)
 
 
-def _names(at: PosedLinks, eye: _Eye) -> Iterator[Name]:
+def _names(at: PosedLinks, eye: _OrthographicView) -> Iterator[Name]:
+    """Yield the names of joints, links, frames and force elements at their points."""
+
     def name(colour: str, text: str, columns: Sequence[int]) -> Name:
         middle = eye.seen(at.points[list(columns)].mean(axis=0))
         return Name(colour, text, (float(middle[0]), float(middle[1])))
@@ -370,6 +400,13 @@ def placed(names: Iterable[Name]) -> tuple[Name, ...]:
     """Place names next to their points without overlaps.
 
     Names of the same colour at the same point are joined by commas.
+
+    Args:
+        names: texts at the points to which they belong.
+
+    Returns:
+        Texts at their lower left corners [drawing units]. A text that has no free position
+        overlaps.
     """
     groups: dict[tuple[str, Point], list[str]] = {}
     for name in names:
@@ -390,22 +427,31 @@ def placed(names: Iterable[Name]) -> tuple[Name, ...]:
 
 
 def _free_room(text: str, point: Point, taken: list[_Room]) -> tuple[Point, _Room]:
-    """Return corner and rectangle of the first free position of a text, or the first position."""
+    """Return lower left corner and rectangle of the first free position of a text.
+
+    If none is free, return the first position. `taken` are occupied rectangles (left, lower, right,
+    upper).
+    """
     tried = [
         _room(text, point, (dx * far, dy * far))
         for far, (dx, dy) in itertools.product(_FURTHER, _SHIFTS)
     ]
-    return next((t for t in tried if not any(_meet(t[1], room) for room in taken)), tried[0])
+    return next((t for t in tried if not any(_overlap(t[1], room) for room in taken)), tried[0])
 
 
 def _room(text: str, point: Point, shift: Point) -> tuple[Point, _Room]:
+    """Return lower left corner and rectangle of a text at an offset `shift` from its point.
+
+    The text ends at the offset if it is to the left, and is centred for an offset without x.
+    """
     width = _WIDTH * LETTERS * len(text)
     x, y = point[0] + shift[0], point[1] + shift[1]
     x -= width if shift[0] < 0 else width / 2 if shift[0] == 0 else 0.0
     return (x, y), (x, y, x + width, y + LETTERS)
 
 
-def _meet(a: _Room, b: _Room) -> bool:
+def _overlap(a: _Room, b: _Room) -> bool:
+    """Whether two rectangles a and b, each (left, lower, right, upper), overlap."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
@@ -413,13 +459,20 @@ def _meet(a: _Room, b: _Room) -> bool:
 
 
 def _path(points: Array) -> tuple[Point, ...]:
+    """Return the first two coordinates of points (k, 2 or 3) as tuples."""
     return tuple((float(row[0]), float(row[1])) for row in points)
 
 
 def hull(points: Array) -> Array:
-    """Return the convex hull of points (k, 2), counterclockwise.
+    """Return the convex hull of points in a plane.
 
     Source: Andrew 1979, monotone chain algorithm.
+
+    Args:
+        points: points (k, 2).
+
+    Returns:
+        Corners (m, 2), counterclockwise.
     """
     rows = sorted({(round(float(x), 9), round(float(y), 9)) for x, y in points})
     lower, upper = _chain(rows), _chain(rows[::-1])
@@ -427,13 +480,15 @@ def hull(points: Array) -> Array:
 
 
 def _chain(rows: list[Point]) -> list[Point]:
+    """Return the lower hull of points sorted by x (the upper hull if the order is reversed)."""
     chain: list[Point] = []
     for row in rows:
-        while len(chain) > 1 and _turn(chain[-2], chain[-1], row) <= 0:
+        while len(chain) > 1 and _signed_area(chain[-2], chain[-1], row) <= 0:
             chain.pop()
         chain.append(row)
     return chain
 
 
-def _turn(a: Point, b: Point, c: Point) -> float:
+def _signed_area(a: Point, b: Point, c: Point) -> float:
+    """Return twice the signed area of the triangle a, b, c: positive if counterclockwise."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

@@ -30,7 +30,7 @@ _SHAPES = """\
 
 
 def svg(drawing: Drawing, title: str, *themes: Theme) -> str:
-    """Return the element `svg` of a drawing.
+    """Return a drawing as the text of an HTML element <svg>.
 
     Args:
         drawing: drawing to write.
@@ -52,13 +52,18 @@ def svg(drawing: Drawing, title: str, *themes: Theme) -> str:
 
 
 def standalone(drawing: Drawing, title: str) -> str:
-    """Return the text of an SVG file without names, for an icon."""
+    """Return a drawing as the text of an SVG file, without names and in light colours.
+
+    Args:
+        drawing: drawing to write.
+        title: title of the drawing, for screen readers.
+    """
     bare = svg(Drawing(drawing.strokes), title, "light")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{bare}\n'
 
 
 def _style(drawing: Drawing, themes: tuple[Theme, ...]) -> str:
-    """Return the style rules of the colours in the drawing."""
+    """Return the CSS rules of a drawing for given themes, or else for the theme of the browser."""
     if themes:
         return _SHAPES + "".join(_rules(drawing, theme) for theme in themes)
     dark = "@media (prefers-color-scheme: dark) {\n" + _rules(drawing, "dark") + "}\n"
@@ -66,6 +71,7 @@ def _style(drawing: Drawing, themes: tuple[Theme, ...]) -> str:
 
 
 def _rules(drawing: Drawing, theme: Theme) -> str:
+    """Return the CSS rules for the colours of a drawing in a theme."""
     lines = {}
     for stroke in drawing.strokes:
         area = stroke.opacity > 0
@@ -73,31 +79,33 @@ def _rules(drawing: Drawing, theme: Theme) -> str:
         fill = f"; fill: {_hex(stroke.colour, theme, stroke.bright)}" if area else ""
         lines[f"path.{_class(stroke)}"] = line + fill
     for name in drawing.names:
-        lines[f"text.{_named(name.colour)}"] = f"fill: {_hex(name.colour, theme)}"
+        lines[f"text.{_css_name(name.colour)}"] = f"fill: {_hex(name.colour, theme)}"
     if drawing.names:
         paper = _hex("background", theme)
         lines["text.halo"] = f"fill: {paper}; stroke: {paper}"
     return "".join(f".drawing {which} {{ {what}; }}\n" for which, what in lines.items())
 
 
-def _named(colour: str) -> str:
+def _css_name(colour: str) -> str:
+    """Return a colour name of the palette as a CSS class name."""
     return colour.replace(".", "-")
 
 
 def _class(stroke: Stroke) -> str:
-    """Return the class name for colour, brightness, and kind (line or area) of a stroke."""
+    """Return the CSS class name for colour, brightness, and kind (line or area) of a stroke."""
     if not stroke.opacity:
-        return f"{_named(stroke.colour)}-line"
-    return f"{_named(stroke.colour)}-{100 * stroke.bright:.0f}"
+        return f"{_css_name(stroke.colour)}-line"
+    return f"{_css_name(stroke.colour)}-{100 * stroke.bright:.0f}"
 
 
 def _hex(colour: str, theme: Theme, bright: float = 1.0) -> str:
+    """Return a colour of the palette as "#rrggbb", scaled by the brightness `bright`."""
     parts = np.clip(np.rint(bright * 255 * rgb(colour, theme)), 0, 255).astype(int)
     return "#" + "".join(f"{part:02x}" for part in parts)
 
 
 def _room(drawing: Drawing) -> tuple[float, float, float, float]:
-    """Return the bounds of strokes and names, with a margin: left, lower, right, upper."""
+    """Return left, lower, right and upper bound of strokes and names, with a margin."""
     left, lower, right, upper = drawing.bounds()
     for name in drawing.names:
         x, y = name.point
@@ -110,14 +118,19 @@ def _room(drawing: Drawing) -> tuple[float, float, float, float]:
 
 
 def _text(name: Name, left: float, upper: float) -> str:
-    """Return the text elements of a name and of a halo that separates it from lines below it."""
+    """Return the SVG elements of a name and of a halo that separates it from lines below it.
+
+    `left` and `upper` are the bounds of the drawing, which become the origin.
+    """
     place = f'x="{name.point[0] - left:.2f}" y="{upper - name.point[1]:.2f}"'
     text = escape(name.text)
     halo = f'<text class="halo" aria-hidden="true" {place}>{text}</text>'
-    return f'{halo}<text class="{_named(name.colour)}" {place}>{text}</text>'
+    return f'{halo}<text class="{_css_name(name.colour)}" {place}>{text}</text>'
 
 
 def _path(stroke: Stroke, left: float, upper: float) -> str:
+    """Return the SVG element of a stroke; `left` and `upper` are the origin of the picture."""
+
     def place(point: Point) -> str:
         return f"{point[0] - left:.2f} {upper - point[1]:.2f}"
 
@@ -139,7 +152,10 @@ _GRID = np.stack(np.meshgrid(np.arange(SIZE) + 0.5, np.arange(SIZE) + 0.5), axis
 
 
 def icon(drawing: Drawing) -> bytes:
-    """Return a PNG file of the drawing with transparent background and no frames, axes, names."""
+    """Return a drawing as a PNG file of 200 x 200 pixels with transparent background.
+
+    Frames, axes, centres of mass and names are left out.
+    """
     image = np.zeros((SIZE, SIZE, 4))
     shown = Drawing(tuple(s for s in drawing.strokes if s.role not in _LEFT_OUT))
     left, lower, right, upper = shown.bounds()
@@ -153,9 +169,12 @@ def icon(drawing: Drawing) -> bytes:
 
 
 def png(pixels: np.ndarray[tuple[int, int, int], np.dtype[np.uint8]]) -> bytes:
-    """Encode pixels (rows, columns, 4) of red, green, blue and opacity as a PNG file.
+    """Encode pixels as a PNG file.
 
     Source: W3C 2003, sections 5 and 7.
+
+    Args:
+        pixels: red, green, blue and opacity (rows, columns, 4), from 0 to 255.
     """
     rows, columns = pixels.shape[:2]
     head = struct.pack(">IIBBBBB", columns, rows, 8, 6, 0, 0, 0)
@@ -165,12 +184,16 @@ def png(pixels: np.ndarray[tuple[int, int, int], np.dtype[np.uint8]]) -> bytes:
 
 
 def _chunk(kind: bytes, content: bytes) -> bytes:
+    """Return a chunk of a PNG file: length, kind, content and checksum."""
     check = zlib.crc32(kind + content)
     return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", check)
 
 
 def _paint(image: Array, stroke: Stroke, points: Array, width: float) -> None:
-    """Draw area and line of a stroke over the image, within the bounding window of the stroke."""
+    """Draw area and line of a stroke over an image (SIZE, SIZE, 4), which is changed.
+
+    `points` (k, 2) and `width` are in pixels.
+    """
     first = np.clip(np.floor(points.min(axis=0) - width), 0, SIZE).astype(int)
     last = np.clip(np.ceil(points.max(axis=0) + width), 0, SIZE).astype(int)
     window = slice(first[1], last[1]), slice(first[0], last[0])
@@ -188,7 +211,7 @@ def _paint(image: Array, stroke: Stroke, points: Array, width: float) -> None:
 
 
 def _cover(image: Array, opacity: Array, colour: Array) -> None:
-    """Blend a colour over the image.
+    """Blend a colour (3,) with an opacity per pixel over an image, which is changed.
 
     Source: Porter & Duff 1984, operator `over`.
     """
@@ -199,7 +222,10 @@ def _cover(image: Array, opacity: Array, colour: Array) -> None:
 
 
 def _distance(grid: Array, a: Array, b: Array) -> Array:
-    """Return the distance of each pixel from the line segment a to b."""
+    """Return the distance of each pixel from the line segment a to b [pixels].
+
+    `grid` are the pixel positions (..., 2).
+    """
     along, length, start = b - a, float((b - a) @ (b - a)), grid - a
     if length == 0:
         share = np.zeros(grid.shape[:2])
@@ -211,7 +237,10 @@ def _distance(grid: Array, a: Array, b: Array) -> Array:
 
 
 def _inside(grid: Array, sides: list[tuple[Array, Array]]) -> Array:
-    """Return 1 for pixels inside a polygon, else 0: a ray from inside has odd crossings."""
+    """Return 1 for pixels inside a polygon, else 0, by counting crossings of its sides.
+
+    `sides` are pairs of end points.
+    """
     odd = np.zeros(grid.shape[:2], dtype=bool)
     x, y = grid[..., 0], grid[..., 1]
     for (ax, ay), (bx, by) in sides:

@@ -36,11 +36,11 @@ BOX_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Faces:
-    """Faces of the same colour in one frame.
+    """Flat faces of the same colour in one frame.
 
     Attributes:
-        corners: corners (n, 4, 3) of faces [m], counterclockwise as seen from outside. A line has
-            each of its two ends twice.
+        corners: corners (n, 4, 3) of n faces [m], counterclockwise as seen from outside. A triangle
+            repeats a corner, and a line has each of its two ends twice.
         colour: name in the palette, or "axes.0" for the first colour of the axes.
         kind: "closed" (visible from outside only), "open" (visible from both sides) or "line".
         opacity: opacity, 1 for opaque faces.
@@ -60,7 +60,7 @@ def faces_of(item: Primitive, size: float) -> Iterator[Faces]:
         size: size of the mechanism [m], for the dashes of axes.
     """
     if isinstance(item, (BarShape, CylinderShape)):
-        yield Faces(_round(item), item.colour)
+        yield Faces(_bar_faces(item), item.colour)
     elif isinstance(item, BallShape):
         angle = np.linspace(-np.pi / 2, np.pi / 2, 9)
         profile = item.radius * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -71,25 +71,31 @@ def faces_of(item: Primitive, size: float) -> Iterator[Faces]:
         R = rotation_onto(np.array(item.axis))
         yield Faces(revolve(profile, 48) @ R.T + np.array(item.at), item.colour)
     elif isinstance(item, BoxShape):
-        yield Faces(_pose(_cuboid(np.array(item.size)), item.pose), item.colour)
+        yield Faces(_transformed(_cuboid(np.array(item.size)), item.pose), item.colour)
     elif isinstance(item, MeshShape):
         corners = np.reshape(item.points, (-1, 3))[np.reshape(item.triangles, (-1, 3))]
         # visible from both sides, because the orientation in mesh files is not reliable
-        yield Faces(_pose(corners[:, [0, 1, 2, 2]], item.pose), item.colour, "open")
+        yield Faces(_transformed(corners[:, [0, 1, 2, 2]], item.pose), item.colour, "open")
     elif isinstance(item, PlateShape):
         yield Faces(_fan(np.array(item.points)), item.colour, "open", item.opacity)
     elif isinstance(item, FrameShape):
         for k in range(3):
             arrow = _arrow(item.length) @ rotation_onto(np.eye(3)[k]).T
-            yield Faces(_pose(arrow, item.pose), f"axes.{k}")
+            yield Faces(_transformed(arrow, item.pose), f"axes.{k}")
     elif isinstance(item, AxisShape):
         yield Faces(_dashes(np.array(item.a), np.array(item.b), size), item.colour, "line")
 
 
 def stretch(item: SpanShape | SpringShape, a: Array, b: Array) -> Faces:
-    """Return the faces of a bar or spring between points a and b of the base frame."""
+    """Return the faces of a bar or spring between two points.
+
+    Args:
+        item: bar or spring of variable length.
+        a: first end point (3,) in the base frame [m].
+        b: second end point (3,) in the base frame [m].
+    """
     if isinstance(item, SpanShape):
-        bar = _round(CylinderShape(item.role, 0, item.colour, tuple(a), tuple(b), item.radius))
+        bar = _bar_faces(CylinderShape(item.role, 0, item.colour, tuple(a), tuple(b), item.radius))
         return Faces(bar, item.colour)
     t = np.linspace(0, 1, 24 * _TURNS + 1)
     grown = item.radius * np.minimum(1, 12 * np.minimum(t, 1 - t))
@@ -101,7 +107,15 @@ def stretch(item: SpanShape | SpringShape, a: Array, b: Array) -> Faces:
 
 
 def revolve(profile: Array, sides: int = _SIDES) -> Array:
-    """Return the faces (n, 4, 3) of a profile (k, 2) of radius and height, revolved about z."""
+    """Return the faces of a surface of revolution about z.
+
+    Args:
+        profile: radius and height (k, 2) of points along the profile.
+        sides: number of faces around the axis.
+
+    Returns:
+        Corners (n, 4, 3) of the faces.
+    """
     angle = np.linspace(0, 2 * np.pi, sides + 1)
     round_ = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     rings = np.concatenate(
@@ -116,7 +130,8 @@ def revolve(profile: Array, sides: int = _SIDES) -> Array:
     return faces.reshape(-1, 4, 3)
 
 
-def _round(item: BarShape | CylinderShape) -> Array:
+def _bar_faces(item: BarShape | CylinderShape) -> Array:
+    """Return the faces (n, 4, 3) of a round bar or of a cylinder in the link frame [m]."""
     a, b = np.array(item.a), np.array(item.b)
     length, r = float(np.linalg.norm(b - a)), item.radius
     along = np.column_stack([np.full(_PIECES + 1, r), np.linspace(0, length, _PIECES + 1)])
@@ -134,7 +149,10 @@ def _round(item: BarShape | CylinderShape) -> Array:
 
 
 def _cuboid(size: Array) -> Array:
-    """Return the faces of a cuboid about the origin, divided along its longest side."""
+    """Return the faces (n, 4, 3) of a cuboid about the origin, divided along its longest side.
+
+    `size` are its side lengths (3,).
+    """
     longest = int(np.argmax(size))
     faces = []
     for corners in BOX_CORNERS[np.array(BOX_FACES)]:
@@ -148,21 +166,25 @@ def _cuboid(size: Array) -> Array:
 
 
 def _arrow(length: float) -> Array:
+    """Return the faces (n, 4, 3) of an arrow of a given length from the origin along z."""
     # relative to the length: shaft radius 0.03, head length 0.2
     profile = [[0, 0], [0.03, 0], [0.03, 0.4], [0.03, 0.8], [0.08, 0.8], [0, 1]]
     return revolve(length * np.array(profile), 8)
 
 
-def _pose(faces: Array, rows: tuple[float, ...]) -> Array:
+def _transformed(faces: Array, rows: tuple[float, ...]) -> Array:
+    """Transform faces (n, 4, 3) by a pose, given as the 12 numbers of the rows of [R p]."""
     pose = np.array(rows).reshape(3, 4)
     return np.array(faces @ pose[:, :3].T + pose[:, 3])
 
 
 def _fan(points: Array) -> Array:
+    """Return the triangles (n, 4, 3) of a convex polygon with corners (k, 3)."""
     return np.array([[points[0], b, c, c] for b, c in itertools.pairwise(points[1:])])
 
 
 def _dashes(a: Array, b: Array, size: float) -> Array:
+    """Return the dashes (n, 4, 3) of a line from a to b; `size` is that of the mechanism [m]."""
     # a dash and a gap together are 0.032 of the size of the mechanism on all axes
     count = max(1, round(float(np.linalg.norm(b - a)) / (0.032 * size)))
     starts = np.arange(count) / count

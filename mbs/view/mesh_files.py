@@ -66,6 +66,10 @@ def read_mesh(path: PathLike) -> Mesh:
 
 @lru_cache(maxsize=256)
 def _read(path: str, stamp: int) -> Mesh:
+    """Read and simplify a mesh file; see `read_mesh` for the errors.
+
+    `stamp`, the modification time of the file, is part of the cache key.
+    """
     kind = Path(path).suffix.lower().removeprefix(".")
     trimesh = _module("trimesh", path)
     if kind == "dae":
@@ -95,6 +99,10 @@ def _read(path: str, stamp: int) -> Mesh:
 
 
 def _module(name: str, path: str) -> Any:
+    """Import a library that reads meshes; raise a ModelError if it is not installed.
+
+    `path` is the mesh file, for the error message.
+    """
     try:
         return importlib.import_module(name)
     except ImportError:
@@ -137,7 +145,7 @@ _MATERIALS = {"bind_material"} | {
 
 
 def _unit(content: bytes) -> float:
-    """Return the length unit of a COLLADA file [m]."""
+    """Return the length unit of a COLLADA file [m]; raise a ValueError if it is not positive."""
     found = _UNIT.search(content)
     unit = float(found[1]) if found else 1.0
     if not 0 < unit < np.inf:
@@ -146,7 +154,9 @@ def _unit(content: bytes) -> float:
 
 
 def thin(points: Array, triangles: NDArray[np.int64], most: int = MOST_TRIANGLES) -> Mesh:
-    """Simplify a mesh: all corners in a cell of a grid are merged at their mean.
+    """Simplify a mesh by merging all corners in a cell of a grid at their mean.
+
+    A mesh that is small enough is returned unchanged.
 
     Source: Rossignac & Borrel 1993, vertex clustering.
 
@@ -180,9 +190,10 @@ def thin(points: Array, triangles: NDArray[np.int64], most: int = MOST_TRIANGLES
 
 
 def _cells(most: int) -> Iterator[int | None]:
-    """Yield None for the original mesh, then numbers of cells along the longest side, decreasing.
+    """Yield None for the original mesh, then decreasing numbers of cells along the longest side.
 
-    A surface intersects about 6 n^2 of the n^3 cells, with two triangles each.
+    `most` is the largest number of triangles. A surface intersects about 6 n^2 of n^3 cells, with
+    two triangles each.
     """
     yield None
     # start with a grid that is too fine even for a flat or thin mesh, and reduce by a sixth

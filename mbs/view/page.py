@@ -28,12 +28,16 @@ STYLES = ("viewer.css",)
 
 
 def assets_folder() -> Path:
-    """Return the folder with the scripts and styles of the viewer, for a web server."""
+    """Return the folder with the scripts and styles of the viewer, which a web server can serve."""
     return Path(__file__).parent / "assets"
 
 
 def asset(name: str) -> str:
-    """Return the text of a script or style of the viewer."""
+    """Return the text of a script or style of the viewer.
+
+    Args:
+        name: file name in `assets_folder`, such as "viewer.js".
+    """
     return (assets_folder() / name).read_text(encoding="utf-8")
 
 
@@ -61,6 +65,13 @@ def look_of(
     made: Scene, view: str, theme: str, shown: Collection[str], hidden: Collection[str] = ()
 ) -> Look:
     """Check the options of a picture of a scene and return them as a Look.
+
+    Args:
+        made: scene of the picture.
+        view: view direction, a key of `Scene.views`.
+        theme: "auto", "light" or "dark".
+        shown: roles that are shown in addition to the default, or one role.
+        hidden: roles that are hidden, or one role.
 
     Raises:
         ModelError: a view, theme or role is unknown.
@@ -94,14 +105,14 @@ def page(
     times: Array | None = None,
     poses: Array | None = None,
 ) -> str:
-    """Return the text of an HTML file.
+    """Return the text of a self-contained HTML file that shows a scene or a motion.
 
     Args:
         scene: scene to show.
         look: appearance of the picture.
-        speed: seconds of the motion per second.
+        speed: seconds of the motion per second of the display.
         times: times (n,) of a motion [s], None for a still picture.
-        poses: poses (n, 12 links) from `Scene.motion`.
+        poses: poses (n, 12 (links + 1)) from `Scene.motion`, required with `times`.
     """
     scripts = [*(asset(name) for name in SCRIPTS), asset("bar.js")]
     styles = [*(asset(name) for name in STYLES), asset("bar.css")]
@@ -130,7 +141,11 @@ def page(
 
 
 def iframe(text: str) -> str:
-    """Return an iframe element that shows an HTML file in another page, such as a notebook."""
+    """Return an HTML element that shows a complete HTML file inside another page or a notebook.
+
+    Args:
+        text: text of the HTML file.
+    """
     source = html.escape(text, quote=True)
     look = f"width: 100%; height: {_HEIGHT}px; border: 0; border-radius: 6px"
     allowed = "allow-scripts allow-downloads"
@@ -138,11 +153,11 @@ def iframe(text: str) -> str:
 
 
 def _pack(times: Array, poses: Array) -> dict[str, object]:
-    """Encode a motion for the script: poses as 32-bit floats in base 64."""
+    """Return times (n,) and poses of a motion for the viewer: poses as base64 of 32-bit floats."""
     data = base64.b64encode(np.ascontiguousarray(poses, dtype="<f4").tobytes())
     return {"times": [round(float(t), 6) for t in times], "packed": data.decode("ascii")}
 
 
 def _data(value: object) -> str:
-    """Return JSON that is safe inside a script element."""
+    """Return a value as JSON that is safe inside a <script> element."""
     return json.dumps(value, allow_nan=False).replace("<", "\\u003c")

@@ -37,8 +37,8 @@ class Camera:
 
     Attributes:
         place: position (3,) of the eye in the base frame [m].
-        axes: unit vectors (3, 3) by rows: to the right, upwards, towards the eye.
-        away: distance of the eye from the middle of the mechanism [m].
+        axes: unit vectors (3, 3) in the base frame by rows: to the right, upwards, towards the eye.
+        away: distance of the eye from the centre of the bounds of the mechanism [m].
     """
 
     place: Array
@@ -46,9 +46,14 @@ class Camera:
     away: float
 
     def seen(self, points: Array) -> tuple[Array, Array]:
-        """Project points (..., 3) to the picture, which has the height 2.
+        """Project points to the picture.
 
-        Returns positions (..., 2) in the picture, and depths (...) [m], larger if nearer.
+        Args:
+            points: points (..., 3) in the base frame [m].
+
+        Returns:
+            Positions (..., 2) in the picture, whose height is 2, and depths (...) [m]: coordinate
+            towards the eye, negative in front of it, larger if nearer.
         """
         local = (points - self.place) @ self.axes.T
         depth = local[..., 2]
@@ -58,6 +63,10 @@ class Camera:
 
 def camera(scene: Scene, view: str) -> Camera:
     """Return the camera of a view of a scene.
+
+    Args:
+        scene: scene to look at.
+        view: view direction, a key of `Scene.views`.
 
     Raises:
         ModelError: the view is unknown.
@@ -109,7 +118,14 @@ class Painter:
     axes: Any
 
     def paint(self, poses: Sequence[float] | Array) -> Any:
-        """Paint the scene at poses (12 links,) from `Scene.poses`. Returns the Figure."""
+        """Paint the scene at given poses of its links.
+
+        Args:
+            poses: poses (12 (links + 1),) from `Scene.poses`.
+
+        Returns:
+            The matplotlib Figure of the painter.
+        """
         matplotlib = optional_module("matplotlib.collections", "plot")
         axes, link_poses = self.axes, np.reshape(poses, (-1, 3, 4))
         axes.clear()
@@ -125,7 +141,9 @@ class Painter:
             matplotlib.LineCollection(segments, colors=tints, linewidths=0.6, zorder=0)
         )
         corners, colours, widths, shadow = self._faces(link_poses)
-        dark = self._mix(self._colour("background"), np.zeros(3), self._number("shadow"))
+        # the palette value is for the browser viewer; here shadows are lighter by 0.6
+        paper = self._colour("background")
+        dark = paper - 0.6 * self._number("shadow") * paper
         axes.add_collection(
             matplotlib.PolyCollection(
                 shadow, facecolors=[dark], edgecolors=[dark], linewidths=0.2, zorder=1
@@ -140,9 +158,13 @@ class Painter:
         return self.figure
 
     def _faces(self, link_poses: Array) -> tuple[Array, Array, Array, Array]:
-        """Return corners in the picture, colours, edge widths, far faces first, and the shadow."""
+        """Return the visible faces, far faces first, and their shadow.
+
+        They are corners (n, 4, 2) in the picture, colours (n, 4), edge widths (n,) [points] and the
+        shadow polygons (m, 4, 2). `link_poses` are poses (links + 1, 3, 4).
+        """
         every = [
-            (self._transformed_corners(faces, link_poses[link]), faces)
+            (faces.corners @ link_poses[link, :, :3].T + link_poses[link, :, 3], faces)
             for link, faces in self.solid
         ]
         for item in self.scene.primitives:
@@ -159,11 +181,11 @@ class Painter:
         order = np.argsort(depth.mean(axis=1), kind="stable")
         return flat[order], colours[order], widths[order], self._shadow(corners)
 
-    def _transformed_corners(self, faces: Faces, pose: Array) -> Array:
-        return np.array(faces.corners @ pose[:, :3].T + pose[:, 3])
-
     def _light(self, corners: Array, faces: Faces) -> tuple[Array, Array, Array]:
-        """Return corners of the visible faces, their shaded colours and their edge widths."""
+        """Return the visible faces with their shading.
+
+        They are corners (n, 4, 3) [m], colours with opacity (n, 4), and edge widths (n,) [points].
+        """
         colour = self._colour(faces.colour)
         if faces.kind == "line":
             rows = np.tile([*colour, 1.0], (len(corners), 1))
@@ -189,7 +211,7 @@ class Painter:
         return corners, np.hstack([rows, alpha]), np.full(len(corners), seam)
 
     def _shadow(self, corners: Array) -> Array:
-        """Return the projections of faces on the ground along the light, in the picture."""
+        """Return the shadows (n, 4, 2) of faces on the ground, in the picture."""
         up, center = np.array(self.scene.up), np.array(self.scene.floor.center)
         # steep light, slightly from the right and from behind, so that shadows are short
         sun = up + 0.25 * self.eye.axes[0] - 0.1 * self.eye.axes[2]
@@ -198,6 +220,7 @@ class Painter:
         return flat
 
     def _grid(self) -> tuple[Array, Array]:
+        """Return the ground grid: lines (n, 2, 2) in the picture, and their colours (n, 3)."""
         floor, up = self.scene.floor, np.array(self.scene.up)
         count = int(floor.reach / floor.step)
         right = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
@@ -216,6 +239,7 @@ class Painter:
         return flat[kept], far + part[:, None] * (near_colour - far)
 
     def _labels(self, link_poses: Array) -> None:
+        """Write the names of the scene next to their points."""
         effects = optional_module("matplotlib.patheffects", "plot")
         # halo and font in points; offsets in half picture heights: next to the point, stacked
         halo = [effects.withStroke(linewidth=2.5, foreground=self._colour("background"))]
@@ -228,15 +252,13 @@ class Painter:
                 self.axes.text(x + 0.02, y, item.text, gid=item.text, **look)
 
     def _colour(self, name: str) -> Array:
+        """Return red, green and blue (3,) of a palette colour, from 0 to 1."""
         return rgb(name, self.theme)
 
     def _number(self, name: str) -> float:
+        """Return a number of the palette, or 0 if the value is not a number."""
         value = PALETTE[self.theme][name]
         return float(value) if isinstance(value, (int, float)) else 0.0
-
-    def _mix(self, first: Array, second: Array, part: float) -> Array:
-        # the palette value is for the browser viewer; here shadows are lighter by 0.6
-        return np.array(first + 0.6 * part * (second - first))
 
 
 def painter(
@@ -246,7 +268,7 @@ def painter(
     shown: Collection[str] = (),
     hidden: Collection[str] = (),
 ) -> Painter:
-    """Return a painter of a scene.
+    """Return a painter of a scene with a new matplotlib figure.
 
     Args:
         scene: scene to paint.
@@ -289,6 +311,11 @@ _COLOURS = 256
 def save_still(painter: Painter, poses: Array, path: PathLike) -> None:
     """Write a still picture as .png or .svg, by the file extension.
 
+    Args:
+        painter: painter of the scene.
+        poses: poses (12 (links + 1),) of base and links.
+        path: path of the file.
+
     Raises:
         ExportError: the file cannot be written.
     """
@@ -303,7 +330,13 @@ def save_still(painter: Painter, poses: Array, path: PathLike) -> None:
 
 
 def save_gif(painter: Painter, poses: Array, path: PathLike, fps: float) -> None:
-    """Write a motion with poses (n, 12 links) as a looping GIF. fps: frames per second.
+    """Write a motion as a GIF that repeats.
+
+    Args:
+        painter: painter of the scene.
+        poses: poses (n, 12 (links + 1)) of base and links in each frame.
+        path: path of the file.
+        fps: frames per second.
 
     Raises:
         ExportError: the file cannot be written.
@@ -327,7 +360,13 @@ def save_gif(painter: Painter, poses: Array, path: PathLike, fps: float) -> None
 
 
 def save_mp4(painter: Painter, poses: Array, path: PathLike, fps: float) -> None:
-    """Write a motion with poses (n, 12 links) as an MP4 file (H.264). fps: frames per second.
+    """Write a motion as an MP4 file (H.264).
+
+    Args:
+        painter: painter of the scene.
+        poses: poses (n, 12 (links + 1)) of base and links in each frame.
+        path: path of the file.
+        fps: frames per second.
 
     Raises:
         ExportError: ffmpeg is not installed or fails, or the file cannot be written.
@@ -349,6 +388,10 @@ def save_mp4(painter: Painter, poses: Array, path: PathLike, fps: float) -> None
 
 
 def _feed(command: list[str], frames: Iterator[Image], path: PathLike) -> None:
+    """Run ffmpeg with the frames as its input; raise an ExportError if it fails.
+
+    `path` is the file to write, for the error message.
+    """
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
     ) as process:
@@ -365,7 +408,7 @@ def _feed(command: list[str], frames: Iterator[Image], path: PathLike) -> None:
 
 
 def _frames(painter: Painter, poses: Array) -> Iterator[Image]:
-    """Yield frames (height, width, 3) with even height and width, as H.264 requires."""
+    """Yield the frames (height, width, 3) of a motion, with even height and width for H.264."""
     canvases = optional_module("matplotlib.backends.backend_agg", "plot")
     painter.figure.set_dpi(_FILM_DOTS)
     canvas: Any = canvases.FigureCanvasAgg(painter.figure)

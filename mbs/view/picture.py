@@ -34,10 +34,11 @@ class Picture:
 
     Attributes:
         scene: shapes of the mechanism.
-        poses: poses (n, 12 links) of the base and links in each frame. n is 1 for a still picture.
+        poses: poses (n, 12 (links + 1)) of the base and links in each frame. n is 1 for a still
+            picture.
         times: time (n,) of each frame [s].
         look: appearance of the picture.
-        speed: seconds of the motion per second.
+        speed: seconds of the motion per second of the animation.
     """
 
     scene: Scene
@@ -58,6 +59,7 @@ class Picture:
         return f"<Picture of {self.scene.system.name}{moving}>"
 
     def _repr_html_(self) -> str:
+        """Return the HTML element that a notebook displays."""
         return iframe(self.html)
 
     def save(self, path: PathLike) -> None:
@@ -75,7 +77,8 @@ class Picture:
         """
         ending = path_of(path).suffix.lower()
         if ending not in _ENDINGS:
-            raise ExportError(f"{path_of(path)}: the ending is {ending!r}; use {_list()}")
+            endings = f"{', '.join(_ENDINGS[:-1])} or {_ENDINGS[-1]}"
+            raise ExportError(f"{path_of(path)}: the ending is {ending!r}; use {endings}")
         if ending == ".html":
             write_text(self.html, path)
         elif ending in (".png", ".svg"):
@@ -84,6 +87,10 @@ class Picture:
             self._film(path, ending)
 
     def _film(self, path: PathLike, ending: str) -> None:
+        """Write the motion as ".gif" or ".mp4" (`ending`).
+
+        Raise an ExportError for a still picture.
+        """
         if len(self.times) < 2:
             raise ExportError(
                 f"{path_of(path)}: the picture does not move; save a .png, .svg or .html file, or"
@@ -95,12 +102,9 @@ class Picture:
         save(self._painter(), self.poses[::every], path, fps / every)
 
     def _painter(self) -> Painter:
+        """Return a painter with the appearance of this picture."""
         theme: Theme = "dark" if self.look.theme == "dark" else "light"
         return painter(self.scene, self.look.view, theme, self.look.shown, self.look.hidden)
-
-
-def _list() -> str:
-    return f"{', '.join(_ENDINGS[:-1])} or {_ENDINGS[-1]}"
 
 
 def show(
@@ -192,6 +196,10 @@ def animate(
 
 
 def _owner(result: Result, system: System | None) -> System:
+    """Return the system whose motion a result contains: `system`, or else that of the result.
+
+    Raise a ModelError if the result is no Result or has no system.
+    """
     if not isinstance(result, Result):
         raise ModelError(f"{quoted(result)} is no Result; give what mbs.simulate.run returns")
     whose = result.system if system is None else system
@@ -204,7 +212,11 @@ def _owner(result: Result, system: System | None) -> System:
 
 
 def _times(result: Result, fps: float, speed: float) -> Array:
-    """Return the times (n,) of the frames [s]."""
+    """Return the times (n,) of the frames [s], equally spaced.
+
+    `fps` are frames per second, `speed` seconds of the motion per second. Raise a ModelError for
+    invalid options, a motion of zero duration or too many frames.
+    """
     for name, value in (("fps", fps), ("speed", speed)):
         if not (isinstance(value, (int, float)) and 0 < value < np.inf):
             raise ModelError(f"{name} is {quoted(value)}; give a number above zero")
@@ -220,7 +232,10 @@ def _times(result: Result, fps: float, speed: float) -> Array:
 
 
 def _positions(result: Result, system: System, times: Array) -> Array:
-    """Return the positions (n, nq) at the times, by linear interpolation of the result."""
+    """Return the positions (n, nq) at the times, by linear interpolation of the result.
+
+    Raise a ModelError if the result does not contain a position of the system.
+    """
     names = [f"{coordinate.name}.q" for coordinate in system.coordinates]
     for name in names:
         if name not in result:

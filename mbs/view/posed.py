@@ -45,16 +45,35 @@ class PosedLinks:
     up: Array
 
     def local(self, link: int, point: Array) -> Vector:
-        """Transform a point from the base frame to the frame of a link."""
+        """Return a point of the base frame in the frame of a link.
+
+        Args:
+            link: number of the link, 0 for the base.
+            point: (3,) point in the base frame [m].
+        """
         R, p = self.poses[link, :, :3], self.poses[link, :, 3]
         return three(R.T @ (point - p))
 
     def local_direction(self, link: int, direction: Array) -> Vector:
-        """Transform a direction from the base frame to the frame of a link."""
+        """Return a direction of the base frame in the frame of a link.
+
+        Args:
+            link: number of the link, 0 for the base.
+            direction: (3,) direction in the base frame.
+        """
         return three(self.poses[link, :, :3].T @ direction)
 
     def local_pose(self, link: int, R: Array, p: Array) -> Rows:
-        """Transform a pose (R, p) from the base frame to the frame of a link."""
+        """Transform a pose from the base frame to the frame of a link.
+
+        Args:
+            link: number of the link, 0 for the base.
+            R: rotation matrix (3, 3) in the base frame.
+            p: origin (3,) in the base frame [m].
+
+        Returns:
+            The 12 numbers of the rows of [R p] in the link frame.
+        """
         R_link = self.poses[link, :, :3].T @ R
         place = np.array(self.local(link, p)).reshape(3, 1)
         return rows(np.hstack([R_link, place]))
@@ -86,7 +105,7 @@ def pose_links(
     """
     p = system.parameter_values(parameters, picture_symbols(system))
     parts = skeleton(system)
-    given = (list(q), _placed(p)) if system.parameters else (list(q),)
+    given = (list(q), _without_nan(p)) if system.parameters else (list(q),)
     points, directions = (np.array(m).T.reshape(-1, 3) for m in parts.function(*given))
     poses = pose_rows(system, np.array(given[0]).reshape(-1, 1), p)[:, 0]
     gravity = Function("gravity", [system.p], [casadi.densify(system.tree.gravity)])
@@ -104,7 +123,13 @@ def pose_links(
 
 
 def picture_symbols(system: System) -> frozenset[str]:
-    """Return the names of the symbols on which poses of links, joints and frames depend."""
+    """Return the names of the symbols on which poses of links, joints and frames depend.
+
+    The result is cached in the system.
+
+    Args:
+        system: mechanism, open or closed.
+    """
 
     def found() -> frozenset[str]:
         if not system.parameters:
@@ -133,26 +158,31 @@ def _up(gravity: Array, z: Array) -> Array:
 
 
 def pose_rows(system: System, q: Array, p: Sequence[float]) -> Array:
-    """Return the poses (12 (links + 1), n) of the base and every link at columns q (nq, n).
+    """Return the poses of the base and every link at many configurations.
 
-    A pose is the rows of [R p], 12 numbers.
+    Args:
+        system: mechanism.
+        q: configurations (nq, n), one per column [rad or m].
+        p: values of all parameters of the system; NaN for parameters that no pose depends on.
 
-    Raises:
-        ModelError: a symbol has no value, or a position is not a number.
+    Returns:
+        Poses (12 (links + 1), n). Each pose has 12 numbers, the rows of [R p] in the base frame.
     """
     function = _pose_function(system)
     if not system.parameters:
         return np.array(function(DM(q)))
-    every = np.repeat(np.array(_placed(p)).reshape(-1, 1), q.shape[1], axis=1)
+    every = np.repeat(np.array(_without_nan(p)).reshape(-1, 1), q.shape[1], axis=1)
     return np.array(function(DM(q), DM(every)))
 
 
-def _placed(p: Sequence[float]) -> list[float]:
-    """Replace NaN of symbols without value by 0. No pose depends on these symbols."""
+def _without_nan(p: Sequence[float]) -> list[float]:
+    """Replace NaN, the value of symbols on which no pose depends, by 0."""
     return [0.0 if np.isnan(value) else value for value in p]
 
 
 def _pose_function(system: System) -> Function:
+    """Return the compiled Function of the poses (12 (links + 1), 1) of base and links at q."""
+
     def build() -> tuple[Named, Named]:
         q = SX.sym("q", system.nq)
         chain = link_poses(system.tree, normalised(system.tree, q))
@@ -166,15 +196,17 @@ def _pose_function(system: System) -> Function:
 
 
 def position_of(system: System, q: Values) -> list[float]:
-    """Return positions (nq,) from a sequence, or from a dict by name.
+    """Return positions (nq,) [rad or m] from a sequence, or from a dict by name.
 
-    Positions without a name in the dict come from the assembled configuration.
+    Args:
+        system: mechanism, open or closed.
+        q: positions (nq,), or a dict of some positions by name. Positions that are not named, and
+            None, mean the assembled configuration.
 
     Raises:
         ModelError: a name is unknown, or the number of positions is wrong.
     """
-    values = system.position(q)
-    return values
+    return system.position(q)
 
 
 # Sizes, bounds, ground and view directions of a picture.
@@ -206,7 +238,12 @@ class Measures:
 
 @dataclass(frozen=True, slots=True)
 class BoundingSphere:
-    """Sphere that contains the mechanism: center in the base frame and radius [m]."""
+    """Sphere that contains the mechanism.
+
+    Attributes:
+        center: centre in the base frame [m].
+        radius: radius [m].
+    """
 
     center: Vector
     radius: float
@@ -214,7 +251,13 @@ class BoundingSphere:
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """Ground grid: center in the base frame, width of a cell, and half of its extent [m]."""
+    """Ground grid.
+
+    Attributes:
+        center: centre in the base frame [m].
+        step: width of a cell [m].
+        reach: half of the extent of the grid [m].
+    """
 
     center: Vector
     step: float
@@ -222,7 +265,7 @@ class Floor:
 
 
 def measures(scene: PosedLinks, solid_points: Array) -> Measures:
-    """Compute sizes of shapes from the extent of a mechanism and the lengths of its links.
+    """Return sizes of shapes from the extent of a mechanism and the lengths of its links.
 
     Args:
         scene: posed links.
@@ -259,9 +302,11 @@ def _gyration(scene: PosedLinks) -> float:
 
 
 def bounds_of(points: Array, margin: float) -> BoundingSphere:
-    """Return a sphere, about the middle of the bounding box, that contains points (n, 3).
+    """Return a sphere, about the middle of the bounding box, that contains all points.
 
-    margin: additional radius [m].
+    Args:
+        points: points (n, 3) in the base frame [m].
+        margin: additional radius [m].
     """
     low, high = points.min(axis=0), points.max(axis=0)
     middle = three((low + high) / 2)
@@ -270,29 +315,42 @@ def bounds_of(points: Array, margin: float) -> BoundingSphere:
 
 
 def floor_of(points: Array, up: Array, bounds: BoundingSphere, gap: float = 0.0) -> Floor:
-    """Return the ground at distance gap [m] below points (n, 3) and the base frame."""
+    """Return the ground grid below a mechanism.
+
+    Args:
+        points: points (n, 3) of the mechanism in the base frame [m].
+        up: unit vector against gravity in the base frame.
+        bounds: bounding sphere, which gives the extent of the grid.
+        gap: distance of the ground below the lowest point and the origin of the base frame [m].
+    """
     lowest = min(0.0, float((points @ up).min())) - gap
     center = np.array(bounds.center)
     center = center + (lowest - float(center @ up)) * up
-    step = _nice(bounds.radius / 5)
+    step = _grid_step(bounds.radius / 5)
     # so large that its border fades out in the distance
     return Floor(three(center), step, 3.2 * bounds.radius)
 
 
-def _nice(value: float) -> float:
+def _grid_step(value: float) -> float:
+    """Return the number nearest to a positive value among 1, 2 and 5 times powers of ten."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(min((n * power for n in (*_NICE, 10.0)), key=lambda n: abs(n - value)))
 
 
 def views(scene: PosedLinks) -> dict[str, Vector]:
-    """Return unit vectors from the mechanism towards the viewer in the base frame, by view name.
+    """Return unit vectors (3,) towards the viewer in the base frame, by name of the view.
 
-    The front view of a mechanism that moves in a vertical plane is along the normal of the plane.
+    The names are iso, front, side and top. The front view of a mechanism that moves in a vertical
+    plane is along the normal of the plane.
+
+    Args:
+        scene: posed links.
     """
     up = scene.up
     # limits of cosines of nearly equal directions; weights of front, right and up: a vertical
     # plane is seen almost from its front, a level mechanism from above, others from a corner
-    right = _unit(np.cross(up, [0.0, 0.0, 1.0]) if abs(up[0]) > 0.9 else _across(up))
+    x = np.eye(3)[0]
+    right = _unit(np.cross(up, [0.0, 0.0, 1.0]) if abs(up[0]) > 0.9 else x - float(x @ up) * up)
     front = np.cross(right, up)
     normal = plane_normal(scene)
     flat = normal is not None and abs(float(normal @ up)) < 0.1
@@ -315,16 +373,13 @@ def _is_level(scene: PosedLinks) -> bool:
     return bool(np.ptp(heights) < 0.12 * spread) and plane_normal(scene) is not None
 
 
-def _across(up: Array) -> Array:
-    """Return the component of the x axis orthogonal to up."""
-    x = np.array([1.0, 0.0, 0.0])
-    return x - float(x @ up) * up
-
-
 def plane_normal(scene: PosedLinks) -> Array | None:
-    """Return the common direction of all revolute axes.
+    """Return the common direction (3,) of all revolute axes in the base frame.
 
     None if the axes differ, or without revolute joints, or with a free or spherical joint.
+
+    Args:
+        scene: posed links.
     """
     axes = [
         scene.directions[axis.direction]
@@ -341,4 +396,5 @@ def plane_normal(scene: PosedLinks) -> Array | None:
 
 
 def _unit(vector: Array) -> Array:
+    """Return a vector divided by its length."""
     return np.array(vector / np.linalg.norm(vector))

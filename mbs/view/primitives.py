@@ -19,24 +19,42 @@ Rows = tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class BarShape:
-    """Round bar with hemispherical ends from a to b [m] in the link frame. radius: in m."""
+class LinkShape:
+    """Primitive on one link.
+
+    Attributes:
+        role: kind of element, by which viewers show or hide it.
+        link: number of its link, 0 for the base.
+        colour: name in the palette, or "#rrggbb".
+    """
 
     role: str
     link: int
     colour: str
+
+
+@dataclass(frozen=True, slots=True)
+class BarShape(LinkShape):
+    """Round bar with hemispherical ends from a to b [m] in the link frame.
+
+    Attributes:
+        radius: radius of the bar [m].
+    """
+
     a: Vector
     b: Vector
     radius: float
 
 
 @dataclass(frozen=True, slots=True)
-class CylinderShape:
-    """Cylinder from a to b [m] in the link frame. bore: radius of its bore [m], 0 if solid."""
+class CylinderShape(LinkShape):
+    """Cylinder from a to b [m] in the link frame.
 
-    role: str
-    link: int
-    colour: str
+    Attributes:
+        radius: outer radius [m].
+        bore: radius of its bore [m], 0 if solid.
+    """
+
     a: Vector
     b: Vector
     radius: float
@@ -44,37 +62,40 @@ class CylinderShape:
 
 
 @dataclass(frozen=True, slots=True)
-class BallShape:
-    """Sphere about a point [m] in the link frame."""
+class BallShape(LinkShape):
+    """Sphere about a point in the link frame.
 
-    role: str
-    link: int
-    colour: str
+    Attributes:
+        at: centre [m].
+        radius: radius [m].
+    """
+
     at: Vector
     radius: float
 
 
 @dataclass(frozen=True, slots=True)
-class BoxShape:
-    """Cuboid with side lengths `size` [m], centred at a pose in the link frame."""
+class BoxShape(LinkShape):
+    """Cuboid at a pose in the link frame.
 
-    role: str
-    link: int
-    colour: str
+    Attributes:
+        pose: pose of its centre, the 12 numbers of the rows of [R p].
+        size: side lengths along the axes of the pose [m].
+    """
+
     pose: Rows
     size: Vector
 
 
 @dataclass(frozen=True, slots=True)
-class RingShape:
-    """Ring (torus) about an axis through a point in the link frame.
+class RingShape(LinkShape):
+    """Ring (torus) about a direction `axis` through the point `at` [m] in the link frame.
 
-    radius: radius of its centre line [m]. tube: radius of the tube [m].
+    Attributes:
+        radius: radius of its centre line [m].
+        tube: radius of the tube [m].
     """
 
-    role: str
-    link: int
-    colour: str
     at: Vector
     axis: Vector
     radius: float
@@ -82,18 +103,20 @@ class RingShape:
 
 
 @dataclass(frozen=True, slots=True)
-class PlateShape:
-    """Thin convex polygon with corners `points` [m] in the link frame."""
+class PlateShape(LinkShape):
+    """Thin convex polygon in the link frame.
 
-    role: str
-    link: int
-    colour: str
+    Attributes:
+        points: corners [m].
+        opacity: opacity from 0 to 1.
+    """
+
     points: tuple[Vector, ...]
     opacity: float
 
 
 @dataclass(frozen=True, slots=True)
-class MeshShape:
+class MeshShape(LinkShape):
     """Triangle mesh at a pose in the link frame.
 
     Attributes:
@@ -101,9 +124,6 @@ class MeshShape:
         triangles: indices of points, three for each triangle.
     """
 
-    role: str
-    link: int
-    colour: str
     pose: Rows
     points: tuple[float, ...]
     triangles: tuple[int, ...]
@@ -111,7 +131,12 @@ class MeshShape:
 
 @dataclass(frozen=True, slots=True)
 class FrameShape:
-    """Three arrows of a length [m] along the axes of a pose in the link frame."""
+    """Three arrows along the axes of a frame in the link frame.
+
+    Attributes:
+        pose: pose of the frame, the 12 numbers of the rows of [R p].
+        length: length of the arrows [m].
+    """
 
     role: str
     link: int
@@ -122,7 +147,11 @@ class FrameShape:
 
 @dataclass(frozen=True, slots=True)
 class AxisShape:
-    """Dashed line from a to b [m] in the link frame."""
+    """Dashed line of an axis in the link frame.
+
+    Attributes:
+        a, b: ends of the line [m].
+    """
 
     role: str
     link: int
@@ -133,7 +162,11 @@ class AxisShape:
 
 @dataclass(frozen=True, slots=True)
 class LabelShape:
-    """Text next to a point [m] in the link frame. row: number of texts below it at this point."""
+    """Text next to the point `at` [m] in the link frame.
+
+    Attributes:
+        row: number of other texts below it at this point.
+    """
 
     role: str
     link: int
@@ -147,7 +180,9 @@ class LabelShape:
 class SpanShape:
     """Round bar of variable length between points on two links.
 
-    ends: points in the frames of the two links [m].
+    Attributes:
+        ends: end points in the frames of the two links [m].
+        radius: radius of the bar [m].
     """
 
     role: str
@@ -161,7 +196,10 @@ class SpanShape:
 class SpringShape:
     """Coil spring of variable length between points on two links.
 
-    ends: points in the frames of the two links [m]. length: length at which its wire is round [m].
+    Attributes:
+        ends: end points in the frames of the two links [m].
+        radius: radius of the coil [m].
+        length: length of the spring at which its wire is drawn with a round cross-section [m].
     """
 
     role: str
@@ -189,7 +227,11 @@ Primitive = (
 
 
 def link_colour(number: int) -> str:
-    """Return the colour name of a link. number: 0 for the base."""
+    """Return the colour name of a link in the palette.
+
+    Args:
+        number: number of the link, 0 for the base.
+    """
     return "base" if number == 0 else LINK_COLOURS[(number - 1) % len(LINK_COLOURS)]
 
 

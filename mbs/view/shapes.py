@@ -9,7 +9,6 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from mbs.assembly.khalil_frames import Cut
 from mbs.components import Box, Cylinder, RollingDisc
 from mbs.components.description import OUTER_WORLD
 from mbs.components.joints import Motion
@@ -17,6 +16,7 @@ from mbs.components.shapes import Shape
 from mbs.errors import ModelError
 from mbs.expressions import Scalar, to_float
 from mbs.models.skeleton import SkeletonForce, SkeletonJoint, SkeletonLink, link_outline
+from mbs.spatial import Pose
 from mbs.text import shortened
 from mbs.view.mesh import revolve
 from mbs.view.mesh_files import read_mesh
@@ -44,13 +44,18 @@ from mbs.view.primitives import (
 def joint_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
     """Yield the shapes and names of the joints.
 
-    Revolute axes are cylinders, prismatic axes boxes, and joints without axes spheres.
+    Revolute axes are cylinders, prismatic axes boxes, and joints without axes spheres. A rolling
+    disc is a ring.
+
+    Args:
+        scene: posed links.
+        sizes: sizes of shapes without own dimensions.
     """
     for joint in _shown(scene):
         if joint.kind == "rollingdisc":
             yield from _wheel(scene, joint, sizes)
             continue
-        yield from _join(scene, joint, sizes)
+        yield from _bar_and_spheres(scene, joint, sizes)
         yield from _axes(scene, joint, sizes)
     yield from _labels(scene, sizes)
 
@@ -75,15 +80,17 @@ def _labels(scene: PosedLinks, sizes: Measures) -> Iterator[LabelShape]:
 
 
 def _look(scene: PosedLinks, joint: SkeletonJoint) -> tuple[str, str]:
-    """Return role and colour of a joint."""
+    """Return role and palette colour of a joint, which depend on whether it is cut or actuated."""
     if joint.cut:
         return "loop", "loop"
     driven = any(c.actuated for c in scene.system.speeds if c.joint == joint.name)
     return "joint", "active" if driven else "joint"
 
 
-def _join(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
-    """Yield a bar if the joint frames are at different points, and spheres if there are no axes."""
+def _bar_and_spheres(
+    scene: PosedLinks, joint: SkeletonJoint, sizes: Measures
+) -> Iterator[Primitive]:
+    """Yield a bar between the two frames of a joint if they differ, and spheres without axes."""
     role, colour = _look(scene, joint)
     a, b = (scene.points[k] for k in joint.points)
     ends = scene.local(joint.links[0], a), scene.local(joint.links[1], b)
@@ -98,6 +105,7 @@ def _join(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[
 
 
 def _axes(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
+    """Yield a cylinder or box and a dashed line for each axis of a joint."""
     role, colour = _look(scene, joint)
     carriers = _carriers(scene, joint)
     # lengths in joint radii: several axes are smaller, so that all are visible; the box of a
@@ -111,7 +119,7 @@ def _axes(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[
             yield CylinderShape(role, link, colour, a, b, radius)
         else:
             side = 1.9 * radius
-            seat = _seat(scene, joint, direction, 1.5 * side)
+            seat = _box_offset(scene, joint, direction, 1.5 * side)
             pose = scene.local_pose(link, rotation_onto(direction), center + seat)
             yield BoxShape(role, link, colour, pose, (side, side, 1.5 * side))
         a, b = _around(scene, link, center, 4.5 * sizes.joint * direction)
@@ -119,7 +127,7 @@ def _axes(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[
 
 
 def _carriers(scene: PosedLinks, joint: SkeletonJoint) -> list[tuple[int, int]]:
-    """Return for each axis the link that it is fixed on and the index of a point on it."""
+    """Return for each axis of a joint the number of its link and the index of a point on it."""
     if joint.cut:
         return [(joint.links[min(k, 1)], joint.points[min(k, 1)]) for k in range(len(joint.axes))]
     system = scene.system
@@ -132,13 +140,15 @@ def _carriers(scene: PosedLinks, joint: SkeletonJoint) -> list[tuple[int, int]]:
 
 
 def _around(scene: PosedLinks, link: int, center: Array, half: Array) -> tuple[Vector, Vector]:
+    """Return the points center - half and center + half of the base frame in a link frame."""
     return scene.local(link, center - half), scene.local(link, center + half)
 
 
-def _seat(scene: PosedLinks, joint: SkeletonJoint, direction: Array, length: float) -> Array:
-    """Return the offset (3,) of the box of a prismatic joint from frame_b, along the axis.
+def _box_offset(scene: PosedLinks, joint: SkeletonJoint, direction: Array, length: float) -> Array:
+    """Return the offset (3,) of the box of a prismatic joint from frame_b, in the base frame [m].
 
-    length: length of the box. The offset keeps the box clear of the sphere of another joint.
+    It is along the axis `direction` and keeps the box, of a given length, clear of the sphere of
+    another joint.
     """
     a, b = (scene.points[k] for k in joint.points)
     back = float((a - b) @ direction)
@@ -155,28 +165,39 @@ def _seat(scene: PosedLinks, joint: SkeletonJoint, direction: Array, length: flo
 
 
 def _wheel(scene: PosedLinks, joint: SkeletonJoint, sizes: Measures) -> Iterator[Primitive]:
+    """Yield the ring of a rolling disc; nothing if its radius has no value."""
     cut = next(cut for cut in scene.system.cuts if cut.edge.joint.name == joint.name)
     disc = cut.edge.joint
     radius = to_float(disc.radius, scene.parameters) if isinstance(disc, RollingDisc) else None
     if radius is None or not isinstance(disc, RollingDisc):
         return
     link, center = joint.links[1], scene.points[joint.points[1]]
-    axis = scene.poses[link, :, :3] @ _rotation(scene, cut) @ np.array(disc.axis, dtype=float)
+    axis = (
+        scene.poses[link, :, :3]
+        @ _numeric(scene, cut.pose_b)[0, :, :3]
+        @ np.array(disc.axis, dtype=float)
+    )
     # radius of the tire, not thicker than joints
     tube = min(0.06 * radius, 0.7 * sizes.joint)
     direction, at = scene.local_direction(link, axis), scene.local(link, center)
     yield RingShape("loop", link, "loop", at, direction, radius - tube, tube)
 
 
-def _rotation(scene: PosedLinks, cut: Cut) -> Array:
-    """Return the rotation matrix (3, 3) of frame_b of a cut joint in its link frame."""
-    system = scene.system
-    R = casadi.Function("R", [system.p], [casadi.densify(cut.pose_b.R)])
-    return np.array(R([scene.parameters[p.name] for p in system.parameters]))
+def _numeric(scene: PosedLinks, *poses: Pose) -> Array:
+    """Return poses (k, 3, 4) [R p] at the values of the symbols of a scene."""
+    matrices = [casadi.densify(casadi.horzcat(pose.R, pose.p)) for pose in poses]
+    flat = casadi.Function("poses", [scene.system.p], [casadi.horzcat(*matrices)])
+    numbers: Array = np.array(flat(list(scene.parameters.values())))
+    return numbers.reshape(3, -1, 4).swapaxes(0, 1)
 
 
 def force_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
-    """Yield springs as coils, and other force elements between two points as bars."""
+    """Yield springs as coils, and other force elements between two points as bars.
+
+    Args:
+        scene: posed links.
+        sizes: sizes of shapes without own dimensions.
+    """
     for force in scene.parts.forces:
         a, b = (scene.points[k] for k in force.points)
         ends = scene.local(force.links[0], a), scene.local(force.links[1], b)
@@ -184,28 +205,29 @@ def force_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[Primitive]:
 
 
 def figures(scene: PosedLinks, notes: list[str]) -> Iterator[Visual]:
-    """Yield the shapes of force elements at their frames.
+    """Yield the shapes that force elements, such as fans, define at their frames.
 
     Args:
         scene: posed links.
         notes: list to which a warning is appended for each missing or simplified mesh.
     """
     system = scene.system
-    values = list(scene.parameters.values())
     for part in system.parts:
         shapes = part.element.drawn(scene.parameters)
         for port, frame in zip(part.element.frames, part.frames, strict=True):
             if port in shapes:
                 link, place = frame
-                both = casadi.densify(casadi.horzcat(place.R, place.p))
-                pose = np.array(casadi.Function("pose", [system.p], [both])(values))
+                pose = _numeric(scene, place)[0]
                 yield from _drawn(shapes[port], link + 1, "force", pose, notes, "force")
 
 
 def _drawn(
     shape: Shape, link: int, colour: str, pose: Array, notes: list[str], role: str
 ) -> Iterator[Visual]:
-    """Yield a shape of a body at a pose (3, 4). A missing mesh adds a note instead."""
+    """Yield a shape of a body as a primitive; a mesh that cannot be read adds a note instead.
+
+    `pose` (3, 4) is in the frame of link number `link`; `colour` is used if the shape has none.
+    """
     if shape.colour is not None:
         colour = "#" + "".join(f"{round(255 * part):02x}" for part in shape.colour)
     try:
@@ -218,6 +240,10 @@ def _drawn(
 def _element(
     force: SkeletonForce, ends: tuple[Vector, Vector], length: float, sizes: Measures
 ) -> SpringShape | SpanShape:
+    """Return a force element between two points as a coil or a bar.
+
+    `ends` are its end points in the link frames, `length` is their distance [m].
+    """
     # diameters: springs are as wide as joints, other elements thinner
     if force.shape == "coil":
         nominal = max(length, 4 * sizes.joint)
@@ -233,28 +259,29 @@ _THIN = 0.35
 
 
 def solid_shapes(scene: PosedLinks) -> Iterator[BoxShape | CylinderShape]:
-    """Yield the bodies that are defined by their dimensions (Box and Cylinder)."""
+    """Yield the bodies that are defined by their dimensions (Box and Cylinder).
+
+    Bodies with a dimension that has no value are left out.
+
+    Args:
+        scene: posed links.
+    """
     for body in scene.system.bodies:
         if body.solid is not None:
-            pose = _body_pose(scene, body.name)
+            pose = _numeric(scene, scene.system.frames[body.name][1])[0]
             shape = _solid(scene, body.link, pose, body.solid)
             if shape is not None:
                 yield shape
 
 
-def _body_pose(scene: PosedLinks, name: str) -> Array:
-    """Return the pose (3, 4) of the reference frame of a body in its link frame."""
-    system = scene.system
-    _, place = system.frames[name]
-    both = casadi.densify(casadi.horzcat(place.R, place.p))
-    pose_of = casadi.Function("pose", [system.p], [both])
-    pose: Array = np.array(pose_of(list(scene.parameters.values())))
-    return pose
-
-
 def _solid(
     scene: PosedLinks, link: int, pose: Array, body: Box | Cylinder
 ) -> BoxShape | CylinderShape | None:
+    """Return a body as a box or cylinder; None if a dimension has no value.
+
+    `pose` (3, 4) is the reference frame of the body in the frame of link number `link`.
+    """
+
     def number(scalar: Scalar | None) -> float:
         value = None if scalar is None else to_float(scalar, scene.parameters)
         return float("nan") if value is None else value
@@ -285,9 +312,7 @@ def visual_shapes(scene: PosedLinks, notes: list[str]) -> Iterator[Visual]:
     system = scene.system
     if not system.shapes:
         return
-    places = [casadi.densify(casadi.horzcat(row.pose.R, row.pose.p)) for row in system.shapes]
-    flat = casadi.Function("places", [system.p], [casadi.horzcat(*places)])
-    poses = np.array(flat(list(scene.parameters.values()))).reshape(3, -1, 4).swapaxes(0, 1)
+    poses = _numeric(scene, *(row.pose for row in system.shapes))
     for row, pose in zip(system.shapes, poses, strict=True):
         link = row.link + 1
         yield from _drawn(row.shape, link, link_colour(link), pose, notes, "visual")
@@ -296,6 +321,11 @@ def visual_shapes(scene: PosedLinks, notes: list[str]) -> Iterator[Visual]:
 def _visual(
     shape: Shape, link: int, colour: str, pose: Array, notes: list[str], role: str
 ) -> Visual:
+    """Return a shape of a body as a primitive at a pose (3, 4) in the frame of link number `link`.
+
+    `colour` and `role` are those of the primitive. `notes` receives a text for a simplified mesh.
+    Raise a ModelError if a mesh cannot be read.
+    """
     size, middle = shape.size, pose[:, 3]
     if shape.kind == "box":
         return BoxShape(role, link, colour, rows(pose), (size[0], size[1], size[2]))
@@ -323,6 +353,11 @@ def _visual(
 def _surface(
     link: int, colour: str, pose: Array, points: Array, triangles: NDArray[np.int64], role: str
 ) -> MeshShape:
+    """Return a triangle mesh as a primitive at a pose (3, 4) in the frame of link number `link`.
+
+    `points` (n, 3) [m] are rounded to six digits of the largest one; `triangles` (m, 3) are indices
+    of points.
+    """
     # round to six digits of the largest coordinate, which is less than a pixel
     digits = 6 - int(np.ceil(np.log10(max(float(np.abs(points).max()), 1e-300))))
     flat = tuple(np.round(points, min(digits, 300)).ravel().tolist())
@@ -330,6 +365,7 @@ def _surface(
 
 
 def _unit_ball() -> tuple[Array, NDArray[np.int64]]:
+    """Return points (n, 3) and triangles (m, 3) of a sphere with the radius 1."""
     angle = np.linspace(-np.pi / 2, np.pi / 2, 9)
     faces = revolve(np.column_stack([np.cos(angle), np.sin(angle)]))
     numbers = np.arange(4 * len(faces)).reshape(-1, 4)
@@ -337,7 +373,15 @@ def _unit_ball() -> tuple[Array, NDArray[np.int64]]:
 
 
 def corners(scene: PosedLinks, solid: Visual) -> Array:
-    """Return points (k, 3) in the base frame that bound a solid."""
+    """Return points in the base frame that bound a shape of a body.
+
+    Args:
+        scene: posed links.
+        solid: primitive on a link.
+
+    Returns:
+        Points (k, 3) [m].
+    """
     R, p = scene.poses[solid.link, :, :3], scene.poses[solid.link, :, 3]
     if isinstance(solid, BallShape):
         around = solid.radius * np.vstack([np.eye(3), -np.eye(3)])
@@ -364,7 +408,7 @@ def link_shapes(
         scene: posed links.
         sizes: sizes of shapes without own dimensions.
         solids: bodies that are defined by their dimensions. A bar inside a solid is left out.
-        seen: indices of links with visual shapes. Their bars get the role "skeleton".
+        seen: numbers of links with visual shapes. Their bars get the role "skeleton".
     """
     for item in _bars(scene, sizes, solids):
         yield replace(item, role="skeleton") if item.link in seen else item
@@ -373,20 +417,24 @@ def link_shapes(
 def _bars(
     scene: PosedLinks, sizes: Measures, solids: list[BoxShape | CylinderShape]
 ) -> Iterator[BarShape | BallShape | PlateShape]:
+    """Yield the bars, plates and spheres of the links.
+
+    Bars inside one of the `solids` are left out.
+    """
     for link in scene.parts.links[1:]:
         own = [solid for solid in solids if solid.link == link.number]
         colour = link_colour(link.number)
         for a, b in link.segments:
             ends = [scene.local(link.number, scene.points[k]) for k in (a, b)]
-            if not any(all(_holds(solid, end, sizes) for end in ends) for solid in own):
+            if not any(all(_contains(solid, end, sizes) for end in ends) for solid in own):
                 yield BarShape("link", link.number, colour, ends[0], ends[1], sizes.bar)
         yield from _plate(scene, link)
         if not link.segments and not own:
             yield from _point_link(scene, link, sizes)
 
 
-def _holds(solid: BoxShape | CylinderShape, point: tuple[float, ...], sizes: Measures) -> bool:
-    """Whether a point in the link frame is inside a solid."""
+def _contains(solid: BoxShape | CylinderShape, point: tuple[float, ...], sizes: Measures) -> bool:
+    """Whether a point (3,) in the link frame [m] is inside a solid."""
     slack, at = SAME_POINT * sizes.size, np.array(point)
     if isinstance(solid, BoxShape):
         pose = np.array(solid.pose).reshape(3, 4)
@@ -400,6 +448,7 @@ def _holds(solid: BoxShape | CylinderShape, point: tuple[float, ...], sizes: Mea
 
 
 def _plate(scene: PosedLinks, link: SkeletonLink) -> Iterator[PlateShape]:
+    """Yield the plate of a link whose segments form a closed polygon."""
     segments = link.segments
     ends = [k for k, (_, b) in enumerate(segments) if b == segments[0][0]]
     if len(segments) > 2 and ends and ends[0] > 1:
@@ -432,7 +481,14 @@ def _point_link(
 def base_shapes(
     scene: PosedLinks, sizes: Measures, floor: float, seen: set[int]
 ) -> Iterator[Primitive]:
-    """Yield the base: bars between its joints, or a column if all joints are at one point."""
+    """Yield the base: bars between its joints, or a column if all joints are at one point.
+
+    Args:
+        scene: posed links.
+        sizes: sizes of shapes without own dimensions.
+        floor: height of the ground, along the direction against gravity from the base origin [m].
+        seen: numbers of links with visual shapes. If it contains 0, the role is "skeleton".
+    """
     for item in _base_bars(scene, sizes, floor):
         yield replace(item, role="skeleton") if 0 in seen else item
 
@@ -440,6 +496,10 @@ def base_shapes(
 def _base_bars(
     scene: PosedLinks, sizes: Measures, floor: float
 ) -> Iterator[BarShape | CylinderShape]:
+    """Yield bars between the joints of the base, or a column.
+
+    `floor` is the height of the ground.
+    """
     points = [
         scene.points[point]
         for joint in scene.parts.joints
@@ -459,6 +519,7 @@ def _base_bars(
 def _column(
     scene: PosedLinks, sizes: Measures, top: Array, floor: float
 ) -> Iterator[CylinderShape]:
+    """Yield a column with a foot from the ground (height `floor` [m]) to the point `top` (3,)."""
     foot = top + (floor - float(top @ scene.up)) * scene.up
     if OUTER_WORLD in scene.system.frames:  # a mounted base need not be above the ground
         foot = np.zeros(3)
@@ -471,7 +532,12 @@ def _column(
 
 
 def frame_shapes(scene: PosedLinks, sizes: Measures) -> Iterator[FrameShape]:
-    """Yield the base frame and the named frames, then the frame of every link."""
+    """Yield the base frame and the named frames, then the frame of every link.
+
+    Args:
+        scene: posed links.
+        sizes: sizes of shapes without own dimensions.
+    """
     identity = tuple(float(x) for x in np.eye(3, 4).ravel())
     yield FrameShape("frame", 0, identity, sizes.frame)
     for frame in scene.parts.frames:

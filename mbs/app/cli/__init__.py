@@ -19,7 +19,10 @@ _TRACEBACK = "MBS_TRACEBACK"
 
 
 def main() -> None:
-    """Run the command line with the arguments of the process, then exit with an exit code."""
+    """Run the command line with the arguments of the process, then exit with an exit code.
+
+    The exit codes are those of the module docstring.
+    """
     from mbs.app.cli.application import application
 
     for stream in (sys.stdout, sys.stderr):

@@ -39,6 +39,7 @@ application = typer.Typer(
 
 
 def _version(wanted: bool) -> None:
+    """Print the version and exit, if the option --version is given."""
     if wanted:
         typer.echo(f"mbs {__version__}")
         raise typer.Exit

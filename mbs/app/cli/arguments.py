@@ -55,7 +55,7 @@ Json = Annotated[
 
 
 def output(what: str) -> Any:
-    """Return the definition of the option --output.
+    """Return the typer definition of the option --output.
 
     Args:
         what: help text of the option.
@@ -67,13 +67,21 @@ Output = Annotated[Path | None, output("File to write; it is replaced as a whole
 
 
 def examples(*lines: str) -> str:
-    """Return the examples at the end of a help page."""
+    """Return the text with examples at the end of a help page, in rich markup.
+
+    Args:
+        *lines: command lines.
+    """
     commands = (f"[dim]$[/dim] {without_markup(line)}" for line in lines)
     return "\n".join(["[bold]Examples[/bold]", *commands])
 
 
 def help_of(command: Callable[..., None]) -> str:
-    """Return the docstring of a command with a single line per paragraph; terminals wrap it."""
+    """Return the docstring of a command with a single line per paragraph; terminals wrap it.
+
+    Args:
+        command: function of the command.
+    """
     paragraphs = without_markup(inspect.getdoc(command) or "").split("\n\n")
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
-import re
 from pathlib import Path
+from pkgutil import iter_modules
 
 import typer
 
@@ -13,29 +13,40 @@ SUFFIXES = (".toml", ".par", ".urdf", ".xacro", ".sdf", ".world", ".xml")
 
 
 def robot_names() -> list[str]:
-    """Return the names of the catalogue, read from the source of `mbs.robots` without CasADi."""
+    """Return the names of the catalogue, by the rule of `catalogue` but without CasADi."""
     found = importlib.util.find_spec("mbs.robots")
-    if found is None or found.origin is None:
-        return []
-    text = Path(found.origin).read_text(encoding="utf-8")
-    return re.findall(r"^from mbs\.robots\._(\w+) import \1$", text, re.MULTILINE)
+    folders = found.submodule_search_locations if found is not None else None
+    return [m.name[1:] for m in iter_modules(folders or []) if m.name.startswith("_")]
 
 
 def robots(incomplete: str) -> list[str]:
-    """Return names of the catalogue, folders and robot files that begin with a text."""
+    """Return names of the catalogue, folders and robot files that complete a word.
+
+    Args:
+        incomplete: beginning of the word, as typed in the shell.
+    """
     names = [name for name in robot_names() if name.startswith(incomplete)]
     return [*names, *_files(incomplete, SUFFIXES)]
 
 
 def keys(incomplete: str) -> list[tuple[str, str]]:
-    """Return keys of models that begin with a text, with their titles."""
+    """Return (key, title) of the models whose key completes a word.
+
+    Args:
+        incomplete: beginning of the word, as typed in the shell.
+    """
     from mbs.app.tasks.equations import entries
 
     return [(e.key, e.title) for e in entries() if e.key.startswith(incomplete)]
 
 
 def options(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Return "NAME=" for the options of the model on the command line."""
+    """Return "NAME=" for the options of the model on the command line that complete a word.
+
+    Args:
+        ctx: context of the command, with the arguments that are already typed.
+        incomplete: beginning of the word, as typed in the shell.
+    """
     from mbs.app.tasks.equations import entries
 
     words = {ctx.params.get("key"), *ctx.args}  # ctx.args holds it while the option has no value
@@ -45,13 +56,18 @@ def options(ctx: typer.Context, incomplete: str) -> list[str]:
 
 
 def languages(incomplete: str) -> list[str]:
-    """Return languages of generated text that begin with a text."""
+    """Return the languages of generated text that complete a word.
+
+    Args:
+        incomplete: beginning of the word, as typed in the shell.
+    """
     from mbs.export.languages import LANGUAGES
 
     return [name for name in LANGUAGES if name.startswith(incomplete)]
 
 
 def _files(incomplete: str, suffixes: tuple[str, ...]) -> list[str]:
+    """Return folders (with "/") and files with given suffixes whose path completes a word."""
     folder, _, start = incomplete.rpartition("/")
     place = Path(f"{folder}/" if folder or incomplete.startswith("/") else ".")
     if not place.is_dir():

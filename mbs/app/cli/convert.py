@@ -90,7 +90,11 @@ def convert(
 
 
 def _table(source: str, parameters: list[str] | None) -> RobotTable | None:
-    """Return the table of frames in a file; None for other robots."""
+    """Return the table of frames in a .par or .toml file `source`; None for other robots.
+
+    `parameters` are NAME=VALUE for symbols. Raise a DescriptionError if the file is invalid or a
+    symbol is unknown.
+    """
     from mbs.formats import read_par, read_toml
     from mbs.robots import catalogue
 

@@ -79,7 +79,7 @@ def count(
 
 
 def _offer(system: System, every: bool) -> list[str]:
-    """Return the keys of all, or of the usual, models that are Functions of the robot."""
+    """Return the keys of the models of the robot: the usual models, or every model."""
     from mbs.app.tasks.equations import entries
 
     having = [e.key for e in entries() if not e.refusal(system) and e.has_function(system)]
@@ -87,7 +87,7 @@ def _offer(system: System, every: bool) -> list[str]:
 
 
 def _with_numbers(rows: Sequence[CountRow]) -> list[CountRow]:
-    """Return the rows with counts; print the reasons of the other rows on standard error.
+    """Return the rows that have counts; print why other rows have none, on standard error.
 
     Raises:
         ModelError: no row has counts.
@@ -102,11 +102,16 @@ def _with_numbers(rows: Sequence[CountRow]) -> list[CountRow]:
 
 
 def _data(row: CountRow, optimise: bool) -> dict[str, Any]:
+    """Return the counts of a model as data for JSON; `optimise` includes those of the optimizer."""
     after = count_data(row.after) if optimise else None
     return {"key": row.key, "title": row.title, "before": count_data(row.before), "after": after}
 
 
 def _tables(name: str, rows: Sequence[CountRow], optimise: bool) -> list[PrintedTable]:
+    """Return the tables of counts of the robot `name`: as built, and after the optimizer.
+
+    The second table requires `optimise`.
+    """
     before = [_cells(row.key, row.before) for row in rows]
     tables = [PrintedTable(f"{name}, as built", _COLUMNS, before, _COLUMNS[1:])]
     if optimise:
@@ -116,6 +121,7 @@ def _tables(name: str, rows: Sequence[CountRow], optimise: bool) -> list[Printed
 
 
 def _cells(key: str, count: Count | None) -> list[str]:
+    """Return the row of a table for the model `key`: its counts by kind of operation."""
     numbers = count_data(count) or {}
     once = numbers["parameter_only"]["total"]
     return [key, *(str(numbers[kind]) for kind in _KINDS), str(once)]

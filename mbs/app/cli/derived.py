@@ -28,7 +28,7 @@ def add_derived(
     options: Callable[[], type],
     epilog: str,
 ) -> None:
-    """Add a command whose options are those of a dataclass in addition to its own.
+    """Add a command to a group, with the fields of a dataclass as options.
 
     The dataclass is imported when the command is called, and not for the help of other commands.
 
@@ -52,15 +52,15 @@ def add_derived(
 
 
 class _DerivedCommand(typer.core.TyperCommand):
-    """Command with parameters and callback of a function that is made when they are needed."""
+    """Command whose function is made by `make` when its parameters or callback are first used."""
 
     def make(self) -> Callable[..., None]:
-        """Return the function of the command."""
+        """Return the function of the command; subclasses implement it."""
         raise NotImplementedError
 
     @functools.cached_property
     def made(self) -> Any:
-        """Command of the function."""
+        """Command that typer derives from the function."""
         alone = typer.Typer(add_completion=False)
         alone.command()(self.make())
         return typer.main.get_command(alone)
@@ -85,10 +85,10 @@ class _DerivedCommand(typer.core.TyperCommand):
 
 
 def with_options(function: Callable[..., None], options: type) -> Callable[..., None]:
-    """Replace the argument `options` of a command by one argument for each option.
+    """Return a command with one argument per option instead of its argument `options`.
 
     Args:
-        function: function of a command.
+        function: function of a command with an argument `options`, a dict of texts by name.
         options: dataclass of the options.
     """
     known = option_fields(options)
@@ -114,7 +114,10 @@ def with_options(function: Callable[..., None], options: type) -> Callable[..., 
 def _parameters(
     options: type, known: Mapping[str, tuple[Field[Any], OptionInfo]]
 ) -> Iterator[inspect.Parameter]:
-    """Yield the parameter of every option that the command line has."""
+    """Yield a parameter of a typer command for every option that the command line has.
+
+    `known` are the fields of the dataclass `options` by name.
+    """
     kinds = value_kinds(options)
     for name, (field, option) in known.items():
         if option.command:
@@ -155,31 +158,32 @@ _TYPED: dict[ValueKind, Callable[[Field[Any], OptionInfo], tuple[Any, Any, dict[
 
 
 def _choices(field: Field[Any], option: OptionInfo) -> str:
-    """Return all choices, or a word if they are too long for the column of the help page."""
+    """Return the choices of an option as "a|b", or its name if this text is too long."""
     every = "|".join(option.choices)
     return every if len(every) <= _LONGEST else field.name.upper()
 
 
 def _names(field: Field[Any], option: OptionInfo) -> str:
-    """Return the name of an option, and the name that turns off what is on by default."""
+    """Return the names of an option for typer, with a --no- name if it is on by default."""
     if field.default is True:
         return f"{option.command}/{option.command.replace('--', '--no-', 1)}"
     return option.command
 
 
 def _flag(option: OptionInfo) -> str:
-    """Return the choice that an option without value selects, "" if the option has a value."""
+    """Return the choice that the bare name of an option selects; "" if the option has a value."""
     name = option.command.removeprefix("--")
     return name if name in option.choices else ""
 
 
 def _text(option: OptionInfo, value: Any) -> Any:
-    """Return the text or texts of an option, None if it was left out."""
+    """Return the value of an option as text or texts; None if it was left out."""
     flag = _flag(option)
     return (flag if value else None) if flag else value
 
 
 def _help(option: OptionInfo, kind: ValueKind) -> str:
+    """Return the help text of an option."""
     text = without_markup(option.command_text or option.text)
     again = " May be repeated." if kind == "names" else ""
     return f"{text[:1].upper()}{text[1:]}{again}"

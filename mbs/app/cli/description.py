@@ -18,8 +18,10 @@ Scalar = float | str
 """Number, or text of an expression of symbols."""
 
 
-def described(system: System) -> dict[str, Any]:
-    """Return a system as numbers, texts, lists and dicts, in SI units and radians.
+def description_data(system: System) -> dict[str, Any]:
+    """Return an assembled system as numbers, texts, lists and dicts that can be converted to JSON.
+
+    Units are SI units and radians. Expressions of symbols without value are texts.
 
     Args:
         system: open or closed system.
@@ -49,6 +51,7 @@ def described(system: System) -> dict[str, Any]:
 
 
 def _coordinates(system: System) -> list[dict[str, Any]]:
+    """Return name, unit, limits and assembled position of each coordinate."""
     return [
         {
             "name": c.name,
@@ -63,6 +66,7 @@ def _coordinates(system: System) -> list[dict[str, Any]]:
 
 
 def _loops(system: System) -> list[dict[str, Any]]:
+    """Return name, joints and number of closure equations of each loop."""
     return [
         {
             "name": loop.name,
@@ -76,6 +80,7 @@ def _loops(system: System) -> list[dict[str, Any]]:
 
 
 def _links(system: System, scalar: Callable[[SX], Scalar]) -> list[dict[str, Any]]:
+    """Return the frame of each link: Khalil parameters, motion, antecedent and bodies."""
     rows = []
     for link, row in zip(system.tree.links, system.links, strict=True):
         placed = zip(GEOMETRY, map(scalar, link.placement.parameters), strict=True)
@@ -97,6 +102,7 @@ def _links(system: System, scalar: Callable[[SX], Scalar]) -> list[dict[str, Any
 
 
 def _inertia(system: System, scalar: Callable[[SX], Scalar]) -> list[dict[str, Any]]:
+    """Return the ten inertial parameters and the drive parameters of each link."""
     rows = []
     for number, link in enumerate(system.tree.links, start=1):
         ten = link.inertia.parameters
@@ -107,16 +113,8 @@ def _inertia(system: System, scalar: Callable[[SX], Scalar]) -> list[dict[str, A
 
 
 def _scalars(system: System) -> Callable[[SX], Scalar]:
-    names = [parameter.name for parameter in system.parameters]
+    """Return the function that converts a scalar SX to a number or to the text of an expression."""
+    from mbs.export.robot_tables import text_function
 
-    def scalar(value: SX) -> Scalar:
-        if value.is_constant():
-            return float(value)
-        from casadi import Function
-
-        from mbs.export.languages.one_line import one_line  # imported late: loads sympy, slow
-        from mbs.operations.graph import graph_of
-
-        return one_line(graph_of(Function("value", [system.p], [value])), names)
-
-    return scalar
+    text = text_function(system)
+    return lambda value: float(value) if value.is_constant() else text(value)

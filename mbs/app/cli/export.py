@@ -120,6 +120,7 @@ def export_fmu(
 
 
 def _fmu_options() -> type:
+    """Return the dataclass of the options of an FMU."""
     from mbs.export.fmu.options import FmuOptions
 
     return FmuOptions
@@ -178,6 +179,7 @@ def export_html(
 
 
 def _write(target: Path, content: bytes) -> None:
+    """Write the content of a file and print its path."""
     from mbs.files import write_bytes
 
     write_bytes(content, target)

@@ -17,7 +17,7 @@ class Commands(typer.core.TyperGroup):
     """Command group that prints the message of an `MbsError` on standard error and exits with 1."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the selected command."""
+        """Run the selected command; an MbsError becomes a message and the exit code 1."""
         try:
             answer = super().invoke(ctx)
             sys.stdout.flush()

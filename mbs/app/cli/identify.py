@@ -102,7 +102,7 @@ def identify_options() -> type:
 
 
 def _content(path: Path, most: int) -> bytes:
-    """Return the content of a record; of a too large file only the first `most` + 1 bytes.
+    """Return the content of a record file; of a too large file only the first `most` + 1 bytes.
 
     Raises:
         DescriptionError: the file cannot be read.
@@ -118,6 +118,7 @@ def _content(path: Path, most: int) -> bytes:
 
 
 def _data(found: Identified) -> dict[str, Any]:
+    """Return the result of an identification as data for JSON."""
     return {
         "robot": found.name,
         "parameters": [asdict(row) for row in found.rows],

@@ -21,17 +21,17 @@ def mechanism(
     gravity: str = "",
     mount: Sequence[str] | None = None,
 ) -> Mechanism:
-    """Return the description of a robot, and print the notes of its reader on standard error.
+    """Return the mechanism of a robot, and print the notes of its reader on standard error.
 
     Args:
-        robot: name in the catalogue, or file.
+        robot: name in the catalogue, or path of a file.
         parameters: NAME=VALUE for some of its symbols.
         gravity: "X,Y,Z" in the world [m/s^2]; empty for the gravity of the robot.
         mount: steps of the mount, such as "x=pi" and "position=0,0,2.5".
 
     Raises:
-        DescriptionError: the robot or a symbol does not exist, the file is malformed, or gravity
-            or mount is invalid.
+        DescriptionError: the robot or a symbol does not exist, the file is malformed, or gravity or
+            mount is invalid.
     """
     from mbs.app.tasks.mounting import mounting_of
     from mbs.robots import load
@@ -51,11 +51,18 @@ def system(
     gravity: str = "",
     mount: Sequence[str] | None = None,
 ) -> System:
-    """Return the assembled robot; arguments and errors as for `mechanism`.
+    """Return the assembled robot.
+
+    Args:
+        robot: name in the catalogue, or path of a file.
+        parameters: NAME=VALUE for some of its symbols.
+        gravity: "X,Y,Z" in the world [m/s^2]; empty for the gravity of the robot.
+        mount: steps of the mount, such as "x=pi" and "position=0,0,2.5".
 
     Raises:
-        AssemblyError: its components do not form a mechanism.
-        Unclosable: its loops cannot be closed.
+        DescriptionError: see `mechanism`.
+        AssemblyError: the components do not form a mechanism.
+        Unclosable: the loops cannot be closed.
     """
     described = mechanism(robot, parameters, gravity, mount)
     known = len(described.notes)
@@ -83,11 +90,11 @@ def numbers(texts: Sequence[str] | None, option: str) -> dict[str, float]:
 
 
 def configuration(system: System, texts: Sequence[str] | None, option: str = "--q") -> list[float]:
-    """Return positions q with closed loops; positions without a text are as assembled.
+    """Return positions q (nq,) [rad or m] with closed loops.
 
     Args:
         system: the robot.
-        texts: NAME=VALUE for some of its positions.
+        texts: NAME=VALUE for some of its positions; other positions are as assembled.
         option: name of the option, for error messages.
 
     Raises:

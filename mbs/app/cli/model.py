@@ -108,7 +108,7 @@ def equations_of(
         assembled: the robot.
         key: key of the model.
         options: NAME=VALUE for some of the options of the model.
-        language: language of the text.
+        language: language of the text; None for the default of the model.
         optimise: whether to apply the optimizer.
 
     Raises:
@@ -124,15 +124,20 @@ def equations_of(
 
 
 def _count_text(written: WrittenEquations) -> str:
+    """Return the operation counts of a model, before and after the optimizer, as a sentence."""
     if written.before is None or written.after is None:
         return f"{written.system} {written.key}: {written.title}"
-    told = f"{written.system} {written.key}: {_say(written.after)}"
+    text = f"{written.system} {written.key}: {_operations_text(written.after)}"
     if written.steps:
-        told += f"; before the optimizer {_say(written.before)}"
-    return told
+        text += f"; before the optimizer {_operations_text(written.before)}"
+    return text
 
 
-def _say(count: Count) -> str:
+def _operations_text(count: Count) -> str:
+    """Return the counts as "3 multiplications, 2 additions, ...".
+
+    Kinds that do not occur are omitted.
+    """
     amounts = {
         "multiplication": count.mul,
         "addition": count.add,
@@ -141,20 +146,22 @@ def _say(count: Count) -> str:
         "function of angles": count.trig,
         "other": count.other,
     }
-    shown = [_many(n, name) for name, n in amounts.items() if n or name in _ALWAYS]
+    shown = [_plural(n, name) for name, n in amounts.items() if n or name in _ALWAYS]
     once = count.parameter_only
     if once is not None and once.total:
-        shown.append(f"{_many(once.total, 'operation')} on parameters alone")
+        shown.append(f"{_plural(once.total, 'operation')} on parameters alone")
     return ", ".join(shown)
 
 
-def _many(amount: int, name: str) -> str:
+def _plural(amount: int, name: str) -> str:
+    """Return an amount with its noun in the plural, except for 1."""
     if amount == 1:
         return f"1 {name}"
     return f"{amount} {name.replace('function', 'functions') if ' ' in name else f'{name}s'}"
 
 
 def _data(written: WrittenEquations) -> dict[str, Any]:
+    """Return a written model as data for JSON."""
     return {
         "robot": written.system,
         "key": written.key,
@@ -170,7 +177,13 @@ def _data(written: WrittenEquations) -> dict[str, Any]:
 
 
 def count_data(count: Count | None) -> dict[str, Any] | None:
-    """Return the counts by kind of operation, and their "total"; None if there is no count."""
+    """Return the counts by kind of operation and their "total", as a dict; None without counts.
+
+    "parameter_only" contains the counts of operations on parameters alone in the same form.
+
+    Args:
+        count: operation counts of a model, or None.
+    """
     if count is None:
         return None
     numbers: dict[str, Any] = {**asdict(count), "total": count.total}

@@ -51,6 +51,7 @@ def models(
 
 
 def _row(entry: Entry) -> dict[str, Any]:
+    """Return a model of the catalogue as a dict of its key, title, menu and options."""
     return {
         "menu": entry.menu,
         "key": entry.key,
@@ -62,6 +63,7 @@ def _row(entry: Entry) -> dict[str, Any]:
 
 
 def _row_of(system: System, entry: Entry) -> dict[str, Any]:
+    """Return a model as `_row`, with values and defaults of its options for a robot."""
     from mbs.app.tasks.equations import option_values
 
     options = [
@@ -78,6 +80,7 @@ def _row_of(system: System, entry: Entry) -> dict[str, Any]:
 
 
 def _tables(rows: Sequence[dict[str, Any]]) -> list[PrintedTable]:
+    """Return one table of models per menu."""
     menus = dict.fromkeys(row["menu"] for row in rows)
     return [
         PrintedTable(
@@ -95,10 +98,12 @@ def _tables(rows: Sequence[dict[str, Any]]) -> list[PrintedTable]:
 
 
 def _options(row: dict[str, Any]) -> str:
-    return ", ".join(_say(option) for option in row["options"])
+    """Return the options of a row as text, separated by commas."""
+    return ", ".join(_option_text(option) for option in row["options"])
 
 
-def _say(option: Any) -> str:
+def _option_text(option: Any) -> str:
+    """Return an option as text: its name, or NAME=DEFAULT if its values are known."""
     if isinstance(option, str):
         return option
     default = option["default"]

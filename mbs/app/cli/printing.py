@@ -40,7 +40,11 @@ class PrintedTable:
 
 
 def print_tables(tables: Iterable[PrintedTable]) -> None:
-    """Print tables with an empty line between them; tables without rows are omitted."""
+    """Print tables with an empty line between them; tables without rows are omitted.
+
+    Args:
+        tables: tables to print.
+    """
     from rich.console import Console
     from rich.text import Text
 
@@ -64,6 +68,7 @@ def _widths(table: PrintedTable) -> list[int]:
 
 
 def _draw(table: PrintedTable, widths: Sequence[int]) -> Any:
+    """Return a rich table with the given column widths [characters]."""
     from rich import box
     from rich.table import Table as Rich
     from rich.text import Text
@@ -83,17 +88,31 @@ def _draw(table: PrintedTable, widths: Sequence[int]) -> Any:
 
 
 def print_json(data: Any) -> None:
-    """Print JSON; infinite and NaN values are null."""
+    """Print data as JSON; infinite and NaN values become null.
+
+    Args:
+        data: data that `plain` accepts.
+    """
     typer.echo(json.dumps(plain(data), indent=2, ensure_ascii=False, allow_nan=False))
 
 
 def note(text: str) -> None:
-    """Print a message on standard error, separate from the output."""
+    """Print a message on standard error, so that the standard output contains only results.
+
+    Args:
+        text: message.
+    """
     typer.echo(text, err=True)
 
 
 def plain(data: Any) -> Any:
-    """Convert data to dicts, lists, texts, finite numbers, booleans and None only."""
+    """Convert data to dicts, lists, texts, finite numbers, booleans and None only.
+
+    Infinite and NaN values become None, arrays become lists, and other objects become texts.
+
+    Args:
+        data: any data.
+    """
     if isinstance(data, Mapping):
         return {str(key): plain(value) for key, value in data.items()}
     if isinstance(data, str | bool | int | None):
@@ -108,5 +127,9 @@ def plain(data: Any) -> Any:
 
 
 def number(value: float | None) -> str:
-    """Return a number with at most six digits; a dash for NaN or None."""
+    """Return a number as text with at most six digits; a dash for NaN or None.
+
+    Args:
+        value: number.
+    """
     return "-" if value is None or math.isnan(value) else f"{value:.6g}"

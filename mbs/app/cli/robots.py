@@ -39,7 +39,7 @@ def robots(
     """
     from mbs.robots import catalogue
 
-    rows = list(described(catalogue()))
+    rows = structure_rows(catalogue())
     if mobility:
         rows = _with_mobility(rows, catalogue())
     if json:
@@ -51,22 +51,20 @@ def robots(
     print_tables([PrintedTable("", (*columns, "source"), cells, counts, cut=True)])
 
 
-def described(robots: Mapping[str, Callable[[], Mechanism]]) -> list[dict[str, Any]]:
-    """Return kind, counts and source of each robot from its description, without assembly.
+def structure_rows(robots: Mapping[str, Callable[[], Mechanism]]) -> list[dict[str, Any]]:
+    """Return name, kind, counts and source of robots from their descriptions, without assembly.
 
     Args:
-        robots: name of a robot to the function that builds it.
+        robots: functions that build the robots, by name.
     """
-    return [{"name": name, **_row(build())} for name, build in robots.items()]
-
-
-def _row(mechanism: Mechanism) -> dict[str, Any]:
-    return {**asdict(structure(mechanism)), "source": mechanism.source}
+    built = {name: build() for name, build in robots.items()}
+    return [{"name": n, **asdict(structure(m)), "source": m.source} for n, m in built.items()]
 
 
 def _with_mobility(
     rows: list[dict[str, Any]], robots: Mapping[str, Callable[[], Mechanism]]
 ) -> list[dict[str, Any]]:
+    """Return the rows with the number of independent velocities as "mobility", after assembly."""
     from mbs.progress import progress
 
     counted = []

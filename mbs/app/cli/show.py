@@ -8,7 +8,7 @@ from typing import Any
 import typer
 
 from mbs.app.cli.arguments import Gravity, Json, Mount, Parameters, Robot, examples
-from mbs.app.cli.description import DRIVE, GEOMETRY, TEN, described
+from mbs.app.cli.description import DRIVE, GEOMETRY, TEN, description_data
 from mbs.app.cli.loading import system
 from mbs.app.cli.printing import PrintedTable, number, print_json, print_tables
 
@@ -32,7 +32,7 @@ def show(
     Frames are given by Khalil's parameters. Inertial parameters are about the origins of these
     frames. Units are SI units and radians.
     """
-    data = described(system(robot, parameter, gravity, mount))
+    data = description_data(system(robot, parameter, gravity, mount))
     if json:
         print_json(data)
         return
@@ -46,6 +46,7 @@ def show(
 
 
 def _tables(data: dict[str, Any]) -> list[PrintedTable]:
+    """Return the tables of a robot from `description_data`."""
     links = {row["number"]: row["name"] for row in data["links"]}
     inertia = [{**row, "name": links[row["link"]]} for row in data["inertia"]]
     drive = [name for name in DRIVE if any(row[name] != 0 for row in inertia)]
@@ -59,16 +60,19 @@ def _tables(data: dict[str, Any]) -> list[PrintedTable]:
 
 
 def _table(title: str, rows: Sequence[dict[str, Any]], names: Sequence[str] = ()) -> PrintedTable:
+    """Return a table of rows (dicts) with the columns `names`; by default all columns."""
     names = names or list(rows[0] if rows else ())
     right = [name for name in names if any(_is_number(row[name]) for row in rows)]
     return PrintedTable(title, names, [[_cell(row[name]) for name in names] for row in rows], right)
 
 
 def _is_number(value: object) -> bool:
+    """Whether a value is a number; booleans are not."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _cell(value: Any) -> str:
+    """Return a value as the text of a table cell."""
     if value is None:
         return "-"
     if isinstance(value, bool):

@@ -153,10 +153,13 @@ def motion_options() -> type:
 
 
 def assigned(**texts: Sequence[str] | None) -> dict[str, Any]:
-    """Return the fields of `SimulationSettings` from the texts of options.
+    """Return arguments of `SimulationSettings` from the texts of options.
 
     Args:
-        **texts: texts NAME=VALUE of each option.
+        **texts: option name, such as tau, to its texts NAME=VALUE.
+
+    Returns:
+        Dict from names to values for each argument.
 
     Raises:
         DescriptionError: a text is not NAME=VALUE.
@@ -171,6 +174,7 @@ def assigned(**texts: Sequence[str] | None) -> dict[str, Any]:
 
 
 def _write(result: Result, file: Path | None) -> None:
+    """Write a result as CSV and print the path; do nothing without a file."""
     if file is not None:
         result.to_csv(file)
         note(f"wrote {file}")
@@ -179,6 +183,10 @@ def _write(result: Result, file: Path | None) -> None:
 def _draw(
     result: Result, assembled: System, plot: Path | None, film: Path | None, signals: Names
 ) -> None:
+    """Write a plot to the file `plot` and a movie to the file `film`, unless they are None.
+
+    `signals` are the names of the signals to plot; None for all.
+    """
     if plot is not None:
         result.plot(signals or None, plot)
         note(f"wrote {plot}")
@@ -190,7 +198,11 @@ def _draw(
 
 
 def data_of(result: Result) -> dict[str, Any]:
-    """Return a result as data for JSON, with columns by name."""
+    """Return a result as data for JSON, with columns by name.
+
+    Args:
+        result: result of a simulation.
+    """
     return {
         "name": result.name,
         "time": result.time,
@@ -202,6 +214,7 @@ def data_of(result: Result) -> dict[str, Any]:
 
 
 def _show(result: Result) -> None:
+    """Print a table with start, extreme and final values of the signals, and the events."""
     rows = [
         (name, unit, *map(number, (x[0], x.min(), x.max(), x[-1])))
         for name, unit in result.units.items()

@@ -113,7 +113,7 @@ def solve_ik(
     from mbs.app.tasks.configurations import configurations
 
     assembled = system(robot, parameter)
-    place = _frame(frame)
+    place = int(frame) if frame is not None and frame.isdecimal() else frame
     wanted = _pose(assembled, place, pose=pose, xyz=xyz, rpy=rpy, q=q)
     found = configurations(
         assembled,
@@ -141,17 +141,16 @@ def pose_options() -> type:
 
 
 def _counts(texts: list[str] | None) -> dict[str, int] | None:
-    """Return the number of positions of each redundant joint, by name."""
+    """Return the number of positions of each redundant joint, by name; None without texts.
+
+    Raise a ModelError if a number is not an integer.
+    """
     counts = dict[str, int]()
     for name, value in numbers(texts, "--redundant").items():
         if value != int(value):
             raise ModelError(f"--redundant {name}: {value:g} is no whole number of positions")
         counts[name] = int(value)
     return counts or None
-
-
-def _frame(text: str | None) -> str | int | None:
-    return int(text) if text is not None and text.isdecimal() else text
 
 
 def _pose(
@@ -163,7 +162,7 @@ def _pose(
     rpy: Triple | None,
     q: list[str] | None,
 ) -> Any:
-    """Return the target pose from the options.
+    """Return the target pose (4, 4) from the options of the command.
 
     Raises:
         ModelError: not exactly one of the options specifies the pose.
@@ -183,12 +182,14 @@ def _pose(
 
 
 def _three(texts: Sequence[str], option: str) -> list[float]:
+    """Return texts as numbers; `option` is for error messages."""
     from mbs.expressions import number
 
     return [number(text, option) for text in texts]
 
 
 def _reason(found: ConfigurationList) -> str:
+    """Return the reason why there is no solution, with the nearest configuration if it is known."""
     reason = f"{found.system}: no solution, {found.reason}"
     near = found.nearest
     if near is None:
@@ -200,6 +201,7 @@ def _reason(found: ConfigurationList) -> str:
 
 
 def _data(found: ConfigurationList) -> dict[str, Any]:
+    """Return the solutions as data for JSON."""
     near = found.nearest
     return {
         "robot": found.system,

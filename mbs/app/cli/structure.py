@@ -31,7 +31,11 @@ class StructureRow:
 
 
 def structure(mechanism: Mechanism) -> StructureRow:
-    """Count joints and loops of a mechanism: rigid bodies are nodes, moving joints are edges."""
+    """Count joints and loops of a mechanism: rigid bodies are nodes, moving joints are edges.
+
+    Args:
+        mechanism: mechanism before its assembly.
+    """
     home: dict[_Port, _Port] = {}
     for a, b in mechanism.connections:
         _join(home, (a.owner.name, a.port), (b.owner.name, b.port))
@@ -50,6 +54,10 @@ def structure(mechanism: Mechanism) -> StructureRow:
 
 
 def _kind(ends: list[tuple[_Port, _Port]], world: _Port, loops: int) -> str:
+    """Return "closed" if there are loops, "tree" if a body has several children, else "serial".
+
+    `ends` are the bodies that each joint connects; a body is represented by one of its ports.
+    """
     if loops:
         return "closed"
     joints_at = Counter(node for pair in ends for node in pair)
@@ -58,12 +66,17 @@ def _kind(ends: list[tuple[_Port, _Port]], world: _Port, loops: int) -> str:
 
 
 def _root(home: dict[_Port, _Port], port: _Port) -> _Port:
+    """Return the port that represents the rigidly connected ports of a port.
+
+    `home` is a disjoint-set forest: parent of each port that is not a root.
+    """
     while port in home:
         port = home[port]
     return port
 
 
 def _join(home: dict[_Port, _Port], a: _Port, b: _Port) -> None:
+    """Record in the forest `home` that the ports a and b are rigidly connected."""
     a, b = _root(home, a), _root(home, b)
     if a != b:
         home[a] = b

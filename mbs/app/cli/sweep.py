@@ -87,6 +87,7 @@ def sweep(
 
 
 def _data(table: SweepTable) -> dict[str, Any]:
+    """Return the table of a sweep as data for JSON."""
     return {
         "units": dict(zip(table.columns, table.units, strict=True)),
         "cases": [dict(zip(table.columns, row, strict=True)) for row in table.rows.tolist()],

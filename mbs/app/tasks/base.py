@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,6 +11,7 @@ from typing import Any
 import numpy as np
 from casadi import Function
 
+from mbs.app.tasks.csv_text import csv_text
 from mbs.assembly import System
 from mbs.identification._base_parameters import METHODS, BaseParameters, base_parameters
 from mbs.identification.regressors import symbolic_parameters
@@ -66,14 +65,9 @@ class BaseTable:
     text: str
 
     def csv(self) -> str:
-        """Return comma-separated name, unit, expression and value, with a header."""
-        stream = io.StringIO()
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(("name", "unit", "expression", "value"))
-        for row in self.rows:
-            value = "" if row.value is None else repr(row.value)
-            writer.writerow((row.name, row.unit, row.expression, value))
-        return stream.getvalue()
+        """Return the base parameters as comma-separated text: name, unit, expression and value."""
+        head = ("name", "unit", "expression", "value")
+        return csv_text(head, ((r.name, r.unit, r.expression, r.value) for r in self.rows))
 
 
 def base(
@@ -108,7 +102,10 @@ def base(
 
 
 def _values(found: BaseParameters) -> list[float | None]:
-    """Return the values of the base parameters with the values of the description."""
+    """Return the values of the base parameters from the description.
+
+    None if a symbol has no value.
+    """
     system = found.system
     p = [system.p] if system.parameters else []
     symbolic = found.function(symbolic_parameters(system, found.columns), *p)

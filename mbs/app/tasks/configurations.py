@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from mbs.assembly import System
 from mbs.errors import ModelError
 from mbs.expressions import Scalar, number
+from mbs.formats.rotations import axis_rotation
 from mbs.loops.pose import goal
 from mbs.models import inverse_geometry, transform
 from mbs.models.catalogue.configurations import SIX, held_at, moving_joints, surplus_joints
@@ -60,13 +61,14 @@ def pose_of(
 
 
 def pose_from(xyz: Sequence[Scalar], rpy: Sequence[Scalar]) -> Array:
-    """Return the pose (4, 4) with a position and rotations about the fixed axes x, then y, then z.
-
-    R = Rz(yaw) Ry(pitch) Rx(roll).
+    """Return the pose with a position and rotations about the fixed axes x, then y, then z.
 
     Args:
         xyz: (3,) position of the origin [m].
         rpy: (3,) roll, pitch and yaw [rad].
+
+    Returns:
+        Homogeneous matrix (4, 4) with R = Rz(yaw) Ry(pitch) Rx(roll).
 
     Raises:
         ModelError: the lengths are not three, or an element has no value.
@@ -79,12 +81,18 @@ def pose_from(xyz: Sequence[Scalar], rpy: Sequence[Scalar]) -> Array:
     T = np.eye(4)
     T[:3, 3] = [number(value, "pose") for value in xyz]
     roll, pitch, yaw = (number(value, "pose") for value in rpy)
-    T[:3, :3] = _turn(2, yaw) @ _turn(1, pitch) @ _turn(0, roll)
+    T[:3, :3] = axis_rotation(2, yaw) @ axis_rotation(1, pitch) @ axis_rotation(0, roll)
     return T
 
 
 def rpy_of(T: Array) -> tuple[float, float, float]:
-    """Return roll, pitch and yaw [rad] of a pose (4, 4); roll is 0 if the x axis is vertical."""
+    """Return roll, pitch and yaw [rad] of a pose, with R = Rz(yaw) Ry(pitch) Rx(roll).
+
+    Roll is 0 if the x axis is vertical, where only a combination of roll and yaw is determined.
+
+    Args:
+        T: (4, 4) homogeneous matrix.
+    """
     R = np.asarray(T, dtype=float)[:3, :3]
     level = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], level)
@@ -114,15 +122,6 @@ def pose_from_text(text: str) -> Array:
     T = np.eye(4)
     T[: len(parts) // 4] = np.array([number(part, "pose") for part in parts]).reshape(-1, 4)
     return T
-
-
-def _turn(axis: int, angle: float) -> Array:
-    k, h = (axis + 1) % 3, (axis + 2) % 3
-    R = np.eye(3)
-    R[k, k] = R[h, h] = math.cos(angle)
-    R[h, k] = math.sin(angle)
-    R[k, h] = -R[h, k]
-    return R
 
 
 __all__ = [
@@ -221,7 +220,16 @@ class ConfigurationList:
 def locked_by_default(
     system: System, frame: str | int | None = None, seed: Seed = None
 ) -> dict[str, float]:
-    """Return the positions of the joints that are locked by default; empty up to six joints."""
+    """Return the positions of the joints that are locked by default; empty up to six joints.
+
+    Args:
+        system: the mechanism.
+        frame: body, named frame or number of a link; None for the terminal frame.
+        seed: configuration that gives the positions; None for the assembled configuration.
+
+    Returns:
+        Position by joint name [rad or m].
+    """
     name = terminal_frame(system) if frame is None else frame
     return held_at(system, surplus_joints(system, name), system.position(seed))
 
@@ -293,11 +301,16 @@ def configurations(
 
 
 def _method(system: System, frame: str | int, method: str, held: Mapping[str, float]) -> str:
+    """Return the method to use: "search" instead of "general" unless six joints are free.
+
+    `held` are the locked and the redundant joints.
+    """
     free = [joint for joint in moving_joints(system, frame) if joint not in held]
     return "search" if method == "general" and free and len(free) != SIX else method
 
 
 def _row(one: Solution, limits: CoordinateLimits) -> Configuration:
+    """Return a solution of the inverse geometric model as a row; `limits` are the joint limits."""
     return Configuration(
         q=_tuple(one.q),
         label=one.branch,
@@ -314,7 +327,10 @@ def _row(one: Solution, limits: CoordinateLimits) -> Configuration:
 def _near(
     system: System, found: Solutions, wanted: Any, seed: Seed, parameters: Values
 ) -> Near | None:
-    """Return the nearest reachable pose; for loops, a local minimum found from the seed."""
+    """Return the nearest reachable pose; for loops, a local minimum found from the seed.
+
+    None if no such pose was found. `wanted` is (frame, target pose).
+    """
     near = found.nearest
     if near is not None and np.all(np.isfinite(near.q)):
         return Near(_tuple(near.q), float(near.distance), float(near.angle), _rows_of(near.T))
@@ -331,8 +347,10 @@ def _near(
 
 
 def _rows_of(T: Array) -> tuple[tuple[float, ...], ...]:
+    """Return a matrix as tuples of rows."""
     return tuple(tuple(float(x) for x in row) for row in T)
 
 
 def _tuple(q: Array) -> tuple[float, ...]:
+    """Return a vector as a tuple of floats."""
     return tuple(float(x) for x in q)

@@ -27,7 +27,7 @@ from mbs.text import did_you_mean, quoted
 
 _FLAGS = {"yes": True, "true": True, "1": True, "on": True}
 _FLAGS |= {"no": False, "false": False, "0": False, "off": False}
-_NOTHING: Mapping[str, Any] = MappingProxyType({})
+_NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class OptionRow:
 
 
 def option_values(
-    system: System, entry: Entry, given: Mapping[str, Any] = _NOTHING
+    system: System, entry: Entry, given: Mapping[str, Any] = _NO_OPTIONS
 ) -> tuple[OptionRow, ...]:
     """Return the options of a model that have an effect for a mechanism.
 
@@ -71,7 +71,13 @@ def option_values(
 
 
 def parsed_options(system: System, entry: Entry, texts: Mapping[str, str]) -> dict[str, Any]:
-    """Read option values from texts such as {"frame": "6", "rows": "Vx, Vy", "f_ext": "yes"}.
+    """Return the values of options of a model from texts.
+
+    Args:
+        system: the mechanism.
+        entry: the model.
+        texts: text by name of the option, such as {"frame": "6", "rows": "Vx, Vy", "f_ext": "yes"}.
+            Empty texts are ignored.
 
     Raises:
         ModelError: an option is unknown, or a value is not available for the mechanism.
@@ -90,6 +96,10 @@ def parsed_options(system: System, entry: Entry, texts: Mapping[str, str]) -> di
 def _value(
     system: System, entry: Entry, option: Option, text: str, chosen: Mapping[str, Any]
 ) -> Any:
+    """Return the value of an option from its text; `chosen` are the values of previous options.
+
+    Raise a ModelError if the value is not available for the mechanism.
+    """
     if option.kind == "flag":
         if text.lower() not in _FLAGS:
             raise ModelError(f"{entry.key}: {option.title} is {quoted(text)}; write yes or no")
@@ -127,8 +137,6 @@ EVERY_PASS = tuple(one.name for one in PASSES)
 """Names of the passes of the optimizer, in the order in which they are applied."""
 
 MENUS = ("Geometric", "Kinematic", "Dynamic", "Identification")
-
-_NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,6 +192,9 @@ def entries() -> tuple[Entry, ...]:
 def entry(key: str) -> Entry:
     """Return the model with a key.
 
+    Args:
+        key: key of the model, such as "idm".
+
     Raises:
         ModelError: no model has this key.
     """
@@ -194,7 +205,12 @@ def entry(key: str) -> Entry:
 
 
 def languages(one: Entry, system: System) -> tuple[str, ...]:
-    """Return the languages in which `equations` can write a model, the default first."""
+    """Return the languages in which `equations` can write a model, the default first.
+
+    Args:
+        one: the model.
+        system: the mechanism.
+    """
     words = (WORDS,) if one.text is not None else ()
     return (*(LANGUAGES if one.has_function(system) else ()), *words)
 
@@ -213,7 +229,7 @@ def equations(
     Args:
         system: the mechanism.
         key: key of the model.
-        options: values of its options. Default: the default values.
+        options: values of its options by name. Default: the default values.
         language: language in `languages`. Default: the first of them.
         passes: names of the passes of the optimizer; empty for the model as built.
         name: name of the function in the text. Default: the name of the model.
@@ -249,7 +265,7 @@ def equations(
 
 
 def _optimise(model: Function, passes: Sequence[str]) -> tuple[Function, tuple[Step, ...]]:
-    """Apply passes; return the Function and the pass reports (unchanged if there are none)."""
+    """Return the Function after the given passes and a report of each pass."""
     if not passes:
         return model, ()
     made = simplification(model, passes)
@@ -259,6 +275,11 @@ def _optimise(model: Function, passes: Sequence[str]) -> tuple[Function, tuple[S
 def _write(
     system: System, one: Entry, chosen: Mapping[str, Any], text: str, started: float
 ) -> WrittenEquations:
+    """Return the equations of a model that provides plain text only.
+
+    `chosen` are its options, `text` is the text, `started` the time at which the computation began
+    [s].
+    """
     return WrittenEquations(
         **_about(system, one, chosen),
         language=WORDS,
@@ -273,6 +294,7 @@ def _write(
 
 
 def _about(system: System, one: Entry, chosen: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of `WrittenEquations` that describe the model and its chosen options."""
     return {
         "key": one.key,
         "title": one.title,
@@ -283,6 +305,7 @@ def _about(system: System, one: Entry, chosen: Mapping[str, Any]) -> dict[str, A
 
 
 def _language(one: Entry, system: System, language: str | None) -> str:
+    """Return the language of the text; raise a ModelError if the model is not written in it."""
     offered = languages(one, system)
     spoken = offered[0] if language is None else str(language).lower()
     if spoken not in offered:
@@ -294,9 +317,6 @@ def _language(one: Entry, system: System, language: str | None) -> str:
 
 
 # Operation counts of several models, before and after the optimizer.
-
-
-_NO_COUNT_OPTIONS: Mapping[str, str] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -322,7 +342,7 @@ def counts(
     system: System,
     keys: Sequence[str] = (),
     passes: Sequence[str] = EVERY_PASS,
-    options: Mapping[str, str] = _NO_COUNT_OPTIONS,
+    options: Mapping[str, str] = _NO_OPTIONS,
 ) -> tuple[CountRow, ...]:
     """Count the operations of models.
 
@@ -346,6 +366,10 @@ def counts(
 
 
 def _row(system: System, key: str, passes: Sequence[str], options: Mapping[str, str]) -> CountRow:
+    """Return the operation counts of a model, or the reason why there are none.
+
+    `key` is the model, `passes` are those of the optimizer, `options` are texts of its options.
+    """
     one = entry(key)
     reason = one.refusal(system)
     if not reason and not one.has_function(system):

@@ -63,7 +63,19 @@ def write_c_library(
     options: Mapping[str, Mapping[str, Any]] | None = None,
     library: Mapping[str, Any] | None = None,
 ) -> Path:
-    """Write the files of `c_library` to a folder and return its path."""
+    """Write the files of a C library to a folder and return the path of the folder.
+
+    Args:
+        system: open or closed system.
+        folder: folder to write.
+        keys: keys of the models.
+        options: options of the models, by key.
+        library: options of the library, as for `c_library`.
+
+    Raises:
+        ModelError: see `c_library`.
+        ExportError: options of the library are invalid, or the folder cannot be written.
+    """
     functions = c_functions(system, keys, options)
     return export.c_library(
         functions, folder, **keywords(CLibraryOptions, library or {}, system.name)
@@ -75,7 +87,16 @@ def c_functions(
     keys: Sequence[str] = MODELS,
     options: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> dict[str, Function]:
-    """Return the models by their names in a C library; see `c_library` for the arguments."""
+    """Return the models as Functions by their names in a C library.
+
+    Args:
+        system: open or closed system.
+        keys: keys of the models.
+        options: options of the models, by key.
+
+    Raises:
+        ModelError: a key is unknown, the system does not have the model, or `keys` is empty.
+    """
     require_system(system)
     if not keys:
         raise ModelError(f"{system.name}: no model is chosen for the C library; choose one or more")
@@ -97,7 +118,7 @@ def fmu(system: System, texts: Mapping[str, Any] | None = None) -> bytes:
         texts: options of `mbs.export.fmu` by name, see `mbs.app.tasks.options.keywords`.
 
     Raises:
-        ModelError, ExportError, ExpressionError, CompilerError: a text is invalid, or see
+        ModelError, ExportError, ExpressionError, CompilerError: an option is invalid, or see
             `mbs.export.fmu`.
     """
     require_system(system)
@@ -106,7 +127,10 @@ def fmu(system: System, texts: Mapping[str, Any] | None = None) -> bytes:
 
 
 def par(system: System) -> bytes:
-    """Return a robot file of SYMORO; see `mbs.export.par`.
+    """Return the content of a SYMORO file of the system; see `mbs.export.par`.
+
+    Args:
+        system: open or closed system.
 
     Raises:
         ModelError: the format cannot express the system.
@@ -115,7 +139,10 @@ def par(system: System) -> bytes:
 
 
 def urdf(system: System) -> bytes:
-    """Return a URDF file of the system; see `mbs.export.urdf`.
+    """Return the content of a URDF file of the system; see `mbs.export.urdf`.
+
+    Args:
+        system: system without loops.
 
     Raises:
         ModelError: the format cannot express the system.
@@ -124,7 +151,10 @@ def urdf(system: System) -> bytes:
 
 
 def sdf(system: System) -> bytes:
-    """Return an SDFormat file of the system; see `mbs.export.sdf`.
+    """Return the content of an SDFormat file of the system; see `mbs.export.sdf`.
+
+    Args:
+        system: open or closed system.
 
     Raises:
         ModelError: the format cannot express the system.
@@ -133,9 +163,12 @@ def sdf(system: System) -> bytes:
 
 
 def toml(system: System) -> bytes:
-    """Return a TOML file of the system: a table of frames with the names of its joints.
+    """Return the content of a TOML file of the system: a table of frames with joint names.
 
-    Link j of the system is frame j. Bodies that are welded together are a single link.
+    Link j of the system is frame j. Bodies that are fixed to each other are a single link.
+
+    Args:
+        system: open or closed system.
 
     Raises:
         ModelError: a table of frames cannot express the system.
@@ -145,7 +178,10 @@ def toml(system: System) -> bytes:
 
 
 def _named(table: RobotTable, system: System) -> RobotTable:
-    """Return the table with the names and limits of the joints, and name and configuration."""
+    """Return a table with the names and limits of the joints of a system.
+
+    The table also gets the name of the system and its assembled configuration as guess.
+    """
     joints = zip(system.coordinates, system.speeds, strict=True)
     frames = [
         replace(frame, name=c.name, limits=c.limits, velocity=s.limits, effort=s.effort)
@@ -184,7 +220,7 @@ def file_stem(system: System) -> str:
 
 
 def _write(write: Callable[[Path], object], name: str) -> bytes:
-    """Return the bytes that a callable writes to a file of this name."""
+    """Return the bytes that the callable `write` writes to a file with this name."""
     with tempfile.TemporaryDirectory(prefix="mbs-export-") as folder:
         path = Path(folder) / name
         write(path)
@@ -192,6 +228,7 @@ def _write(write: Callable[[Path], object], name: str) -> bytes:
 
 
 def _zip(files: Mapping[str, bytes]) -> bytes:
+    """Return a zip file of files by path; equal files give equal bytes."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mbs import identification as identified_by
+from mbs.app.tasks.csv_text import csv_text
 from mbs.app.tasks.laws import number
 from mbs.app.tasks.options import keywords
 from mbs.assembly import System
@@ -36,8 +35,11 @@ TIME = "time"
 def record_columns(system: System) -> dict[str, tuple[str, ...]]:
     """Return the columns that a record of a system may have, by quantity.
 
+    Args:
+        system: open or closed system.
+
     Returns:
-        the quantities "time", "q", "v" and "tau" to the names of their columns. A record of a
+        Names of the columns for each of the quantities "time", "q", "v" and "tau". A record of a
         closed system may contain only positions and velocities of the independent joints.
     """
     require_system(system)
@@ -87,7 +89,11 @@ def record_of(system: System, content: bytes) -> Record:
 
 
 def _positions(system: System, every: Sequence[str], there: Sequence[str]) -> list[str]:
-    """Return the position columns: of all joints, else of the independent joints of loops."""
+    """Return the position columns: of all joints, else of the independent joints of loops.
+
+    `every` are all position columns, `there` the columns of the record. Raise a ModelError if one
+    is missing.
+    """
     missing = [name for name in every if name not in there]
     if not missing:
         return list(every)
@@ -99,6 +105,7 @@ def _positions(system: System, every: Sequence[str], there: Sequence[str]) -> li
 
 
 def _without(name: str, there: Sequence[str]) -> str:
+    """Return the error message for a missing column; `there` are the columns of the record."""
     return (
         f"record: there is no column {name!r} in the file, whose first line must name it;"
         f" {did_you_mean(name, there)}"
@@ -205,20 +212,21 @@ class Identified:
     bodies: str
 
     def csv(self) -> str:
-        """Return the base parameters as comma-separated values."""
+        """Return the estimates of the base parameters as comma-separated text with a header."""
         head = ("name", "value", "deviation", "percent", "unit", "essential", "grouping")
+        words = {True: "yes", False: "no"}
         rows = (
-            (r.name, *map(repr, (r.value, r.deviation, r.percent)), r.unit, _yes(r), r.grouping)
+            (r.name, r.value, r.deviation, r.percent, r.unit, words[r.essential], r.grouping)
             for r in self.rows
         )
-        return _csv(head, rows)
+        return csv_text(head, rows)
 
     def residuals_csv(self) -> str:
-        """Return time, measured and predicted right-hand sides as comma-separated values."""
+        """Return time, measured and predicted right-hand sides as comma-separated text."""
         names = [effort.name for effort in self.efforts]
         head = ("time", *(f"{n}.{kind}" for n in names for kind in ("measured", "predicted")))
         pairs = np.stack([self.measured, self.predicted], axis=2).reshape(len(self.time), -1)
-        return _csv(head, (map(repr, row) for row in np.column_stack([self.time, pairs]).tolist()))
+        return csv_text(head, np.column_stack([self.time, pairs]).tolist())
 
 
 def identify(
@@ -262,7 +270,11 @@ def identify(
 
 
 def identified(found: Identification) -> Identified:
-    """Convert an identification to plain data."""
+    """Convert an identification to plain data.
+
+    Args:
+        found: result of `mbs.identification.identify`.
+    """
     residuals = found.estimate.residuals
     return Identified(
         name=found.system.name,
@@ -279,6 +291,7 @@ def identified(found: Identification) -> Identified:
 
 
 def _rows(found: Identification) -> tuple[EstimateRow, ...]:
+    """Return the estimates of the base parameters as rows."""
     estimate = found.estimate
     needed = set(found.essential().estimate.names)
     grouping = dict(zip(found.base.names, found.base.equations, strict=True))
@@ -299,6 +312,7 @@ def _rows(found: Identification) -> tuple[EstimateRow, ...]:
 
 
 def _efforts(residuals: Residuals, tested: Residuals) -> tuple[EffortError, ...]:
+    """Return the errors of the efforts; `tested` are those in the last quarter of the record."""
     return tuple(
         EffortError(name, unit, *map(float, numbers))
         for name, unit, *numbers in zip(
@@ -311,15 +325,3 @@ def _efforts(residuals: Residuals, tested: Residuals) -> tuple[EffortError, ...]
             strict=True,
         )
     )
-
-
-def _yes(row: EstimateRow) -> str:
-    return "yes" if row.essential else "no"
-
-
-def _csv(head: Sequence[str], rows: Iterable[Iterable[str]]) -> str:
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(head)
-    writer.writerows(rows)
-    return stream.getvalue()

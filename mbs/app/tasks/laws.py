@@ -41,6 +41,7 @@ def number(value: float | str, where: str, known: Mapping[str, float] | None = N
 
     Raises:
         ExpressionError: the text is not in the grammar, or has no finite value.
+        ModelError: the text contains an unknown symbol.
     """
     read = _read(value, where)
     _require_known(read, known or {}, where)
@@ -53,8 +54,14 @@ def number(value: float | str, where: str, known: Mapping[str, float] | None = N
 def numbers(values: Laws, where: str, known: Mapping[str, float]) -> dict[str, float]:
     """Convert the values of a mapping to numbers by `number`.
 
+    Args:
+        values: numbers or texts, by name.
+        where: system and quantity, for error messages.
+        known: values of the symbols that texts may contain.
+
     Raises:
-        ExpressionError: a value is not a number.
+        ExpressionError: a text is not in the grammar, or has no finite value.
+        ModelError: a text contains an unknown symbol.
     """
     return {name: number(value, f"{where} of {name}", known) for name, value in values.items()}
 
@@ -85,8 +92,8 @@ def law_of_motion(
 ) -> Callable[[SX, SX, SX], SX]:
     """Return a vector of values as a function of (t, q, v); values without a law are zero.
 
-    A law may contain t, the positions and velocities of the system, such as `j1.q` and `j1.v`,
-    and the symbols of the system, which are replaced by numbers.
+    A law may contain t, the positions and velocities of the system, such as `j1.q` and `j1.v`, and
+    the symbols of the system, which are replaced by numbers.
 
     Args:
         system: open or closed system.
@@ -95,8 +102,12 @@ def law_of_motion(
         known: values of the symbols of the system.
         what: description of the laws, for error messages.
 
+    Returns:
+        Callable (t (1, 1), q (nq, 1), v (nv, 1)) -> values (len(names), 1).
+
     Raises:
-        ExpressionError: a law cannot be read, or contains an unknown symbol.
+        ExpressionError: a law cannot be read, or has no finite value.
+        ModelError: a law contains an unknown symbol.
     """
     signals = (
         *(f"{c.name}.q" for c in system.coordinates),
@@ -126,7 +137,8 @@ def law_of_time(
         where: system and quantity, for error messages.
 
     Raises:
-        ExpressionError: the law cannot be read, or contains an unknown symbol.
+        ExpressionError: the law cannot be read, or has no finite value.
+        ModelError: the law contains an unknown symbol.
     """
     read = _law(law, where, (TIME,), known)
     if isinstance(read, Number):
@@ -137,7 +149,10 @@ def law_of_time(
 def _law(
     law: float | str, where: str, signals: Sequence[str], known: Mapping[str, float]
 ) -> Expression:
-    """Read a law, with numbers instead of the symbols of the system."""
+    """Return a law as an expression of `signals`, with numbers for the symbols of the system.
+
+    Raise an ExpressionError or ModelError that begins with `where` if it is invalid.
+    """
     values = {name: value for name, value in known.items() if name not in signals}
     read = _read(law, where)
     _require_known(read, [*signals, *values], where)
@@ -152,6 +167,7 @@ def _law(
 
 
 def _read(value: float | str, where: str) -> Expression:
+    """Return a text or number as an expression; raise an ExpressionError if it is invalid."""
     if isinstance(value, str) and len(value) > _LONGEST:
         raise ExpressionError(
             f"{where}: the text has {len(value)} characters; write at most {_LONGEST}"
@@ -160,6 +176,7 @@ def _read(value: float | str, where: str) -> Expression:
 
 
 def _require_known(read: Expression, known: Iterable[str], where: str) -> None:
+    """Raise a ModelError if an expression contains a symbol that is not in `known`."""
     names = list(known)
     for parameter in parameters_of(read):
         if parameter.name not in names:

@@ -33,6 +33,10 @@ def mounting_of(
 
 
 def _mount(texts: Sequence[str], where: str) -> dict[str, Any]:
+    """Return the argument `mount` of `mbs.load`: rotations about axes in order, and a position.
+
+    Raise a DescriptionError that begins with `where` if a text is not a step of a mount.
+    """
     rotation, position = list[tuple[str, str]](), list[list[str]]()
     for text in texts:
         name, _, value = (part.strip() for part in text.partition("="))
@@ -52,7 +56,7 @@ def _mount(texts: Sequence[str], where: str) -> dict[str, Any]:
 
 
 def _three(text: str, where: str) -> list[str]:
-    """Return three texts that are separated by commas."""
+    """Return the three texts that commas separate; raise a DescriptionError for another number."""
     parts = [part.strip() for part in text.split(",")]
     if len(parts) != 3 or not all(parts):
         raise DescriptionError(

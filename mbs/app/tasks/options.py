@@ -17,14 +17,14 @@ def keywords(
     where: str,
     known: Mapping[str, float] | None = None,
 ) -> dict[str, Any]:
-    """Convert texts to the values of options.
+    """Return the values of options from texts, as keyword arguments.
 
-    A number may be a text such as "pi/2". An empty text or list of an option that may be None
-    stands for its default.
+    A number may be a text such as "pi/2". An empty text or list of an option whose default is None
+    is ignored.
 
     Args:
         options: dataclass of the options.
-        texts: text, list of texts or value of options by name. The others have their defaults.
+        texts: text, list of texts or value of options by name. Other options keep their defaults.
         where: name of the system, for error messages.
         known: values of the symbols that numbers may contain.
 
@@ -33,7 +33,8 @@ def keywords(
 
     Raises:
         ExpressionError: a number cannot be read.
-        ModelError: the value is none of the choices.
+        ModelError: a value is not among the choices of its option, or a number contains an unknown
+            symbol.
     """
     hints, kinds = get_type_hints(options), value_kinds(options)
     found: dict[str, Any] = {}

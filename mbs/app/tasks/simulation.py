@@ -69,22 +69,22 @@ def simulate(
         energies, `closure_residual`, devices and sensors.
 
     Raises:
-        ExpressionError: a text cannot be read, or contains an unknown symbol.
+        ExpressionError: a text cannot be read, or has no finite value.
         MbsError: see `mbs.simulate.run`.
     """
     return run(system, **run_arguments(system, settings or SimulationSettings()), quiet=quiet)
 
 
 def run_arguments(system: System, settings: SimulationSettings) -> dict[str, Any]:
-    """Convert settings to the arguments of `mbs.simulate.run`.
+    """Return the arguments of `mbs.simulate.run` from settings.
 
     Args:
         system: open or closed system.
         settings: settings of the simulation.
 
     Raises:
-        ExpressionError: a text cannot be read, or contains an unknown symbol.
-        ModelError: a name is unknown or a joint has no motor, or the method is unknown.
+        ExpressionError: a text cannot be read, or has no finite value.
+        ModelError: a name or symbol is unknown, a joint has no motor, or the method is unknown.
     """
     require_system(system)
     where = system.name
@@ -122,7 +122,11 @@ def known_values(system: System, given: Mapping[str, float]) -> dict[str, float]
 
 
 def csv_bytes(result: Result) -> bytes:
-    """Return the content of the file that `Result.to_csv` writes."""
+    """Return the content of the CSV file that `Result.to_csv` writes.
+
+    Args:
+        result: result of a simulation.
+    """
     with tempfile.TemporaryDirectory(prefix="mbs-csv-") as folder:
         path = Path(folder) / "result.csv"
         result.to_csv(path)
@@ -132,7 +136,11 @@ def csv_bytes(result: Result) -> bytes:
 def _positions(
     system: System, settings: SimulationSettings, known: Mapping[str, float]
 ) -> dict[str, float] | list[float] | None:
-    """Return the initial positions, except of coordinates with prescribed motion."""
+    """Return the initial positions, except those of coordinates with prescribed motion.
+
+    None for the assembled configuration. `known` are the values of symbols in texts. Raise a
+    ModelError if the settings contain both q0 and a configuration.
+    """
     if not settings.configuration:
         return numbers(settings.q0, f"{system.name}: q0", known) or None
     if settings.q0:
@@ -150,7 +158,7 @@ def _positions(
 
 
 def _efforts(system: System, laws: Laws, known: Mapping[str, float]) -> Any:
-    """Return the laws of the efforts of all joints; None without laws."""
+    """Return the efforts (nv, 1) of all joints as a function of (t, q, v); None without laws."""
     if not laws:
         return None
     effort_function(system, dict.fromkeys(laws, 0.0))  # raises for joints that have no motor
@@ -159,7 +167,7 @@ def _efforts(system: System, laws: Laws, known: Mapping[str, float]) -> Any:
 
 
 def _inputs(system: System, laws: Laws, known: Mapping[str, float]) -> Any:
-    """Return the laws of the inputs of all devices; None without laws."""
+    """Return the inputs of all devices as a function of (t, q, v); None without laws."""
     if not laws:
         return None
     input_function(system, dict.fromkeys(laws, 0.0))  # raises for unknown devices
@@ -196,7 +204,7 @@ class Movie:
 
 
 def film(system: System, settings: SimulationSettings | None = None) -> Movie:
-    """Simulate a system and select about thirty frames per second for a movie, at most 600.
+    """Simulate a system and select frames of a movie: about thirty per second, at most 600.
 
     Args:
         system: open or closed system.

@@ -29,7 +29,9 @@ _BLOCK = re.compile(r"determinant of the (\d+ x \d+) block of (.*)")
 
 
 def condition(text: str, coordinates: Sequence[tuple[str, bool]]) -> str:
-    """Return in words when a factor is zero, such as "q3 is -pi/2 or pi/2 (C3 = 0)".
+    """Return a sentence that gives the condition under which a factor is zero.
+
+    An example is "q3 is -pi/2 or pi/2 (C3 = 0)".
 
     Args:
         text: text of the factor; S23 is sin(q2 + q3).
@@ -49,7 +51,10 @@ def condition(text: str, coordinates: Sequence[tuple[str, bool]]) -> str:
 
 
 def _angle(text: str, turning: Sequence[str]) -> tuple[str, str] | None:
-    """Return "s" or "c" and the angle if the text is a single sine or cosine; else None."""
+    """Return ("s" or "c", angle) if a text is a single sine or cosine of an angle; else None.
+
+    `turning` are the names of the revolute joints.
+    """
     short = _SHORT.fullmatch(text)
     if short:
         names = [f"q{digit}" for digit in short[2]]
@@ -150,6 +155,10 @@ def singular(
 
 
 def _verdict(constant: str, factors: Sequence[DeterminantFactor]) -> str:
+    """Return the sentence that gives the condition of singularity.
+
+    The determinant is the product of the text `constant` and `factors`.
+    """
     if constant == "0":
         return "The determinant is zero in every configuration; name other rows or columns."
     if not factors:
@@ -160,6 +169,7 @@ def _verdict(constant: str, factors: Sequence[DeterminantFactor]) -> str:
 def _factor(
     system: System, one: SingularFactor, determinant: Function, start: Array
 ) -> DeterminantFactor:
+    """Return a factor of a determinant with a configuration near `start` where it is zero."""
     names = [(c.name, c.kind == "revolute") for c in system.coordinates]
     configuration = _zero(system, one.function, start)
     value: float | None = None
@@ -176,7 +186,10 @@ def _factor(
 
 
 def _zero(system: System, function: Function, start: Array) -> tuple[float, ...] | None:
-    """Return the nearest zero of a function of q that was found with closed loops, or None."""
+    """Return the zero of a function of q nearest to `start`, with closed loops; None if not found.
+
+    The search starts from random configurations around `start` (nq,).
+    """
     residual = _residual(system, function)
     rng = np.random.default_rng(_SEED)
     found = list[Array]()
@@ -185,7 +198,7 @@ def _zero(system: System, function: Function, start: Array) -> tuple[float, ...]
         root = gauss_newton(residual, start + matter * rng.uniform(-reach, reach, start.size))
         if root.converged:
             near = start + difference(system, root.x, start)
-            found.append(near if _largest(residual(near)[0]) < _OPEN else root.x)
+            found.append(near if np.max(np.abs(residual(near)[0]), initial=0.0) < _OPEN else root.x)
     closing = Closing(system, np.array(system.p_default)) if system.is_closed else None
     fitting = [q for q in found if closing is None or closing.faces(q)]
     if not fitting:
@@ -210,11 +223,8 @@ def _residual(system: System, function: Function) -> Callable[[Array], tuple[Arr
     return residual
 
 
-def _largest(rows: Array) -> float:
-    return float(np.max(np.abs(rows), initial=0.0))
-
-
 def _value_and_slope(system: System, function: Function) -> Function:
+    """Return the Function (q, p) -> value of a function and its gradient (1, nq)."""
     q = SX.sym("q", system.nq)
     inputs = [q, system.p] if system.parameters else [q]
     value = Function.__call__(function, *inputs)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import itertools
 import os
 from collections.abc import Mapping, Sequence
@@ -12,13 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mbs.app.tasks.csv_text import csv_text
 from mbs.app.tasks.laws import number
 from mbs.app.tasks.simulation import SimulationSettings, run_arguments
 from mbs.assembly import System
 from mbs.assembly.tables import EFFORT_UNIT
 from mbs.errors import ModelError
-from mbs.result import Result
-from mbs.simulate import Sweep
 from mbs.simulate import sweep as simulated_cases
 from mbs.text import quoted
 
@@ -43,13 +40,9 @@ class SweepTable:
     failures: Mapping[int, str]
 
     def csv(self) -> str:
-        """Return comma-separated values with a header; empty fields for failed cases."""
-        stream = io.StringIO()
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(self.columns)
-        for row in self.rows.tolist():
-            writer.writerow(["" if x != x else repr(x) for x in row])
-        return stream.getvalue()
+        """Return the table as comma-separated text with a header; empty fields for failed cases."""
+        rows = self.rows.tolist()
+        return csv_text(self.columns, (["" if x != x else x for x in row] for row in rows))
 
 
 def grid_of(texts: Mapping[str, str]) -> dict[str, list[float]]:
@@ -94,7 +87,8 @@ def sweep(
     summary = study.summary()
     varied = list(grid)
     values = [[case[name] for name in varied] for case in study.cases]
-    units = _units(system) | _signal_units(study)
+    first = next((result for _, result in study), None)
+    units = _units(system) | ({} if first is None else dict(first.units))
     columns = (*varied, *summary)
     return SweepTable(
         columns=columns,
@@ -105,6 +99,10 @@ def sweep(
 
 
 def _values(text: str, name: str) -> list[float]:
+    """Return the values of a text "FROM:TO:STEP" or "a, b, c".
+
+    Raise a ModelError if it is neither.
+    """
     parts = text.split(":")
     if len(parts) == 1:
         return [number(part.strip(), f"grid of {name}") for part in text.split(",")]
@@ -125,13 +123,8 @@ def _values(text: str, name: str) -> list[float]:
     return [float(f"{start + k * step:.14g}") for k in range(whole + 1)]
 
 
-def _signal_units(study: Sweep) -> dict[str, str]:
-    first: Result | None = next((result for _, result in study), None)
-    return {} if first is None else dict(first.units)
-
-
 def _units(system: System) -> dict[str, str]:
-    """Return the units of all quantities that can be varied."""
+    """Return the units of all quantities that can be varied, by name."""
     positions = ((f"{c.name}.q", c.unit) for c in system.coordinates)
     rates = ((f"{s.name}.v", s.unit) for s in system.speeds)
     efforts = ((f"{s.name}.tau", EFFORT_UNIT[s.unit]) for s in system.speeds)

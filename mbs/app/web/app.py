@@ -37,12 +37,17 @@ Listener = Callable[[], Coroutine[Any, Any, None] | None]
 
 
 async def aside(function: Callable[..., Any], *args: Any) -> Any:
-    """Call a short function in the thread that builds graphs, and return its result."""
+    """Call a short function in the thread that builds CasADi graphs, and return its result.
+
+    Args:
+        function: function to call.
+        *args: its arguments.
+    """
     return await asyncio.get_running_loop().run_in_executor(_ASIDE, function, *args)
 
 
 class AppBase:
-    """Session of a visitor and the page that shows it.
+    """Session of a visitor and the browser page that shows it.
 
     Attributes:
         session: the robot, its history and its configuration.
@@ -88,12 +93,21 @@ class AppBase:
             return None
 
     async def aside(self, function: Callable[..., Any], *args: Any) -> Any:
-        """Call a short function in the thread that builds graphs, and return its result."""
+        """Call a short function in the thread that builds CasADi graphs, and return its result.
+
+        Args:
+            function: function to call.
+            *args: its arguments.
+        """
         return await aside(function, *args)
 
     def complain(self, error: Exception | str) -> None:
-        """Show an error notification."""
-        sentence = self._sentence(error)
+        """Show an error as a notification in the browser; do nothing if the page was closed.
+
+        Args:
+            error: error message, or exception. An exception that is not an MbsError is logged.
+        """
+        sentence = self._error_text(error)
         if self.is_left:
             return
         with self._client:
@@ -107,21 +121,31 @@ class AppBase:
             )
 
     def tell(self, sentence: str) -> None:
-        """Show a short message."""
+        """Show a short message in the browser for a few seconds; do nothing if the page was closed.
+
+        Args:
+            sentence: message.
+        """
         if self.is_left:
             return
         with self._client:
             ui.notify(sentence, position="bottom", timeout=3500)
 
     def download(self, data: bytes, name: str) -> None:
-        """Send a file to the browser."""
+        """Send a file to the browser, which stores it; do nothing if the page was closed.
+
+        Args:
+            data: content of the file.
+            name: file name.
+        """
         if self.is_left:
             return
         with self._client:
             ui.download(data, name)
 
     @staticmethod
-    def _sentence(error: Exception | str) -> str:
+    def _error_text(error: Exception | str) -> str:
+        """Return the message of an error; an exception that is not an MbsError is logged."""
         if isinstance(error, (str, MbsError)):
             return str(error)
         _LOG.error("the app could not go on", exc_info=error)
@@ -130,26 +154,47 @@ class AppBase:
         )
 
     def on_robot(self, listener: Listener) -> None:
-        """Add a listener that is called after each successful assembly of a robot."""
+        """Add a listener that is called after each successful assembly of a robot.
+
+        Args:
+            listener: function without arguments, or coroutine function.
+        """
         self._on_robot.append(listener)
 
     def on_clear(self, listener: Listener) -> None:
-        """Add a listener that is called when another robot is opened, before its assembly."""
+        """Add a listener that is called when another robot is opened, before its assembly.
+
+        Args:
+            listener: function without arguments, or coroutine function.
+        """
         self._on_clear.append(listener)
 
     def on_configuration(self, listener: Listener) -> None:
-        """Add a listener that is called after each change of the configuration."""
+        """Add a listener that is called after each change of the configuration.
+
+        Args:
+            listener: function without arguments, or coroutine function.
+        """
         self._on_configuration.append(listener)
 
     def on_document(self, listener: Listener) -> None:
-        """Add a listener that is called after each edit, valid or not."""
+        """Add a listener that is called after each edit of the robot, valid or not.
+
+        Args:
+            listener: function without arguments, or coroutine function.
+        """
         self._on_document.append(listener)
 
     def on_time(self, listener: Callable[[float], Any]) -> None:
-        """Add a listener that is called with the time of the movie [s], ten times per second."""
+        """Add a listener that is called ten times per second while a movie plays.
+
+        Args:
+            listener: function of the time of the movie [s].
+        """
         ui.on("app-time", lambda event: listener(float(event.args)))
 
-    def _tell(self, listeners: Sequence[Listener]) -> None:
+    def _notify(self, listeners: Sequence[Listener]) -> None:
+        """Call listeners, unless the page was closed; coroutines run in the background."""
         if self.is_left:
             return
         with self._client:
@@ -163,7 +208,7 @@ class AppBase:
 
 
 class AppPicture(AppBase):
-    """App with a picture whose configuration can be changed."""
+    """App with a picture of the mechanism, whose configuration the user can change."""
 
     def __init__(self, session: Session) -> None:
         super().__init__(session)
@@ -189,7 +234,7 @@ class AppPicture(AppBase):
         self._robot, self._scene, self._camera = self.session.robot, None, "iso"
         self._wanted.clear()
         self._send("clear")
-        self._tell(self._on_clear)
+        self._notify(self._on_clear)
 
     async def set_configuration(self, q: Sequence[float]) -> None:
         """Show the mechanism in another configuration.
@@ -205,10 +250,12 @@ class AppPicture(AppBase):
             return
         self.session.q = tuple(float(x) for x in q)
         await self._pose(self.session.q)
-        self._tell(self._on_configuration)
+        self._notify(self._on_configuration)
 
     async def move(self, index: int, value: float) -> None:
-        """Move a coordinate by hand; only the last of its pending moves is made.
+        """Move a coordinate to a position, with the loops closed.
+
+        Of several moves of a coordinate that arrive during a computation, only the last is made.
 
         Args:
             index: index of the coordinate in q.
@@ -225,6 +272,7 @@ class AppPicture(AppBase):
             self._is_moving = False
 
     async def _move_once(self) -> None:
+        """Make one pending move with closed loops; an error is stored as `session.refusal`."""
         index = next(iter(self._wanted))
         value = self._wanted.pop(index)
         system, q = self.session.system, self.session.q
@@ -233,8 +281,8 @@ class AppPicture(AppBase):
         try:
             q = await self.aside(moved, system, q, index, value)
         except Exception as error:
-            self.session.refusal = self._sentence(error)
-            self._tell(self._on_configuration)
+            self.session.refusal = self._error_text(error)
+            self._notify(self._on_configuration)
             return
         if self.session.system is system:
             if self._scene is not None:  # else the refusal explains why there is no picture
@@ -242,6 +290,7 @@ class AppPicture(AppBase):
             await self.set_configuration(q)
 
     async def _pose(self, q: Vector) -> None:
+        """Send the poses of the links at a configuration (nq,) to the browser."""
         drawn = self._scene
         if drawn is not None and len(q) == drawn.system.nq:
             flat = await self.aside(drawn.poses, q)
@@ -269,11 +318,21 @@ class AppPicture(AppBase):
         self._send("pause")
 
     def look(self, camera: str) -> None:
-        """Set the camera: "iso", "front", "top", "side", or "fit"."""
+        """Set the view direction of the picture.
+
+        Args:
+            camera: "iso", "front", "top", "side", or "fit" (whole mechanism in the present
+                direction).
+        """
         self._send("camera", camera)
 
     def show(self, role: str, shown: bool) -> None:
-        """Show or hide a kind of elements of the picture, such as "frame"."""
+        """Show or hide a kind of elements of the picture.
+
+        Args:
+            role: kind of elements, such as "frame".
+            shown: whether to show them.
+        """
         self.session.shown[role] = shown
         self._send("visible", role, shown)
 
@@ -282,7 +341,7 @@ class AppPicture(AppBase):
         self._send("screenshot", f"{self.document.name}.png")
 
     def _send(self, method: str, *args: Any) -> None:
-        """Call a method of the picture in the browser."""
+        """Call a method of the picture in the browser with arguments that JSON can express."""
         if self.is_left:
             return
         values = ", ".join(json.dumps(value) for value in args)
@@ -290,7 +349,7 @@ class AppPicture(AppBase):
 
 
 class App(AppPicture):
-    """A page of the app: the session of its visitor and all operations on it.
+    """Page of the app: the session of its visitor and all operations on it.
 
     Attributes:
         drawer: tabs of results.
@@ -305,15 +364,22 @@ class App(AppPicture):
         self._client.on_delete(self._stop_works)
 
     def build_cards(self) -> None:
-        """Create the corner that shows running jobs."""
+        """Create the corner of the page that shows running jobs."""
         self._cards.build()
 
     async def start(self) -> None:
         """Assemble the document of the session and show it in the configuration of the session."""
-        await self._settle()
+        await self._assemble_and_draw()
 
     async def edit(self, cell: Cell, text: str) -> None:
-        """Change the text of a cell."""
+        """Change the text of a cell, then assemble and draw the robot.
+
+        An error is shown if the cell cannot be changed.
+
+        Args:
+            cell: position of the cell.
+            text: new text.
+        """
         try:
             document = self.document.changed(cell, text)
         except MbsError as error:
@@ -322,28 +388,43 @@ class App(AppPicture):
         await self.change(document)
 
     async def change(self, document: Document) -> None:
-        """Replace the present document, and assemble and show the new one."""
+        """Replace the present document, then assemble and draw the new one.
+
+        Args:
+            document: another description of the same robot.
+        """
         self.session.change(document)
-        await self._settle()
+        await self._assemble_and_draw()
 
     async def open_robot(self, make: Callable[..., Document], *args: Any) -> bool:
         """Open the robot that `make(*args)` describes, without any state of the present robot.
 
+        An error of `make` is shown.
+
+        Args:
+            make: function that returns a document.
+            *args: its arguments.
+
         Returns:
-            whether `make` returned a document; if not, the present robot remains.
+            Whether `make` returned a document; if not, the present robot remains.
         """
         document = await self._made(make, *args)
         if document is None:
             return False
         self.session.open(document)
-        await self._settle()
+        await self._assemble_and_draw()
         return True
 
-    async def describe_anew(self, make: Callable[..., Document]) -> bool:
+    async def show_other_description(self, make: Callable[..., Document]) -> bool:
         """Show another description of the same robot, in the present configuration.
 
+        An error of `make` is shown.
+
+        Args:
+            make: function that returns a document.
+
         Returns:
-            whether `make` returned a document; if not, the present description remains.
+            Whether `make` returned a document; if not, the present description remains.
         """
         document = await self._made(make)
         if document is None:
@@ -352,6 +433,10 @@ class App(AppPicture):
         return True
 
     async def _made(self, make: Callable[..., Document], *args: Any) -> Document | None:
+        """Return the document that `make(*args)` returns.
+
+        Show its error and return None if it fails.
+        """
         try:
             document: Document = await self.aside(make, *args)
         except Exception as error:
@@ -362,15 +447,15 @@ class App(AppPicture):
     async def undo(self) -> None:
         """Undo the last change."""
         if self.session.undo():
-            await self._settle()
+            await self._assemble_and_draw()
 
     async def redo(self) -> None:
         """Redo the last change that was undone."""
         if self.session.redo():
-            await self._settle()
+            await self._assemble_and_draw()
 
-    async def _settle(self) -> None:
-        """Assemble and draw the document; a later edit cancels this."""
+    async def _assemble_and_draw(self) -> None:
+        """Assemble and draw the present document; a later edit cancels this."""
         self._edit += 1
         edit, document, session = self._edit, self.document, self.session
         if session.robot != self._robot:
@@ -388,23 +473,26 @@ class App(AppPicture):
             answer = await self.aside(assembled)
         except Exception as error:
             if edit == self._edit:
-                session.refusal = self._sentence(error)
-                self._tell(self._on_document)
+                session.refusal = self._error_text(error)
+                self._notify(self._on_document)
             return
         if edit != self._edit:
             return
         if answer is not None:
             self._show(document, *answer)
-        self._tell(self._on_document)
+        self._notify(self._on_document)
 
     def _show(self, document: Document, q: Vector, drawn: Scene | None, why: str) -> None:
-        """Show an assembled document; `why` is the reason if there is no picture."""
+        """Show an assembled document in the configuration q.
+
+        `drawn` is its picture, or None for the reason `why`.
+        """
         self.session.settle(document, q)
         self.session.refusal = why
         if drawn is not None:
             self._draw(drawn)
-        self._tell(self._on_robot)
-        self._tell(self._on_configuration)
+        self._notify(self._on_robot)
+        self._notify(self._on_configuration)
 
     async def run(self, label: str, task: Callable[..., Any], *args: Any) -> Any:
         """Run `task(system, *args)` in a child process, while a card shows its progress.
@@ -417,7 +505,7 @@ class App(AppPicture):
             *args: further arguments.
 
         Returns:
-            the result; None if the task was stopped or failed.
+            Result of the task; None if it was stopped or failed.
         """
         try:
             self.system()
@@ -447,12 +535,17 @@ class App(AppPicture):
             work.cancel()
 
     def open(self, title: str, key: str | None = None) -> AbstractContextManager[Any]:
-        """Open a tab of results to fill; it replaces a tab with the same key."""
+        """Open a tab of results, which the block fills; it replaces a tab with the same key.
+
+        Args:
+            title: title of the tab.
+            key: key of the tab; by default a new tab.
+        """
         return self.drawer.open(title, key)
 
 
 async def warm_up() -> None:
-    """Load all modules and caches, so that the first visitor does not have to wait."""
+    """Load all modules and fill caches, so that the first visitor does not have to wait."""
 
     def once() -> None:
         system = Document.of_name("rx90").system()
@@ -465,7 +558,7 @@ async def warm_up() -> None:
 
 
 def _drawn(system: System, q: Vector) -> tuple[Scene | None, str]:
-    """Return the picture and "", or None and the reason."""
+    """Return the scene of a system at q and ""; None and the reason if it cannot be drawn."""
     needed = picture_symbols(system)
     values = zip(system.parameters, system.parameter_values(needed=()), strict=True)
     unknown = [symbol.name for symbol, value in values if value != value and symbol.name in needed]

@@ -13,12 +13,14 @@ from nicegui import ui
 
 @dataclass(slots=True)
 class _Tab:
+    """Elements of a tab in the page: its head, and the panel with its content."""
+
     head: ui.element
     panel: ui.element
 
 
 class Drawer:
-    """Tabs, of which a single tab is visible. `build` creates them at the present position."""
+    """Tabs of results, of which a single tab is visible."""
 
     def __init__(self) -> None:
         self._tabs: dict[str, _Tab] = {}
@@ -29,11 +31,15 @@ class Drawer:
         self._on_tabs: Callable[[tuple[str, ...]], Any] = lambda names: None
 
     def on_tabs(self, listener: Callable[[tuple[str, ...]], Any]) -> None:
-        """Set a listener that gets the names of all tabs, the visible tab last, at each change."""
+        """Set a listener that is called at each change of the tabs.
+
+        Args:
+            listener: function of the keys of all tabs, the visible tab last.
+        """
         self._on_tabs = listener
 
     def build(self, on_fill: Callable[[bool], Any]) -> None:
-        """Create the empty drawer.
+        """Create the empty drawer at the present position of the page.
 
         Args:
             on_fill: callable; called with True when a tab is opened, and with False when the last
@@ -66,7 +72,11 @@ class Drawer:
             yield tab.panel
 
     def select(self, name: str) -> None:
-        """Show a tab and hide the others."""
+        """Show a tab and hide the others.
+
+        Args:
+            name: key of the tab.
+        """
         for other, tab in self._tabs.items():
             tab.panel.set_visibility(other == name)
             if other == name:
@@ -77,7 +87,11 @@ class Drawer:
         self._on_tabs((*(other for other in self._tabs if other != name), name))
 
     def close(self, name: str) -> None:
-        """Close a tab; the previous tab is shown then."""
+        """Close a tab; if it was visible, the previous tab is shown. An unknown tab is ignored.
+
+        Args:
+            name: key of the tab.
+        """
         names = list(self._tabs)
         tab = self._tabs.pop(name, None)
         if tab is None:
@@ -94,6 +108,7 @@ class Drawer:
             self.select(next(other for other, tab in self._tabs.items() if tab.panel.visible))
 
     def _head(self, name: str, title: str) -> ui.element:
+        """Create the head of a tab with a button that closes it."""
         assert self._heads is not None
         with self._heads, ui.element("button").classes("app-tab") as head:
             ui.label(title)
@@ -103,13 +118,14 @@ class Drawer:
         return head
 
     def _panel(self) -> ui.element:
+        """Create the empty panel of a tab."""
         assert self._panels is not None
         with self._panels:
             return ui.element("div").classes("app-panel")
 
 
 def _into_view(head: ui.element) -> None:
-    """Scroll to the head of a tab, as soon as the page has drawn it."""
+    """Scroll to the head of a tab as soon as the page has drawn it."""
     find = f"document.getElementById('{head.html_id}')"
     scroll = f"{find}?.scrollIntoView({{block: 'nearest', inline: 'nearest'}})"
     head.client.run_javascript(f"setTimeout(() => {scroll}, 100)")

@@ -76,7 +76,7 @@ async def run(
         reader.start()
         return await _answer(messages, progress)
     finally:
-        await asyncio.shield(asyncio.to_thread(_end, process, folder))
+        await asyncio.shield(asyncio.to_thread(_stop_child, process, folder))
 
 
 def _context() -> Any:
@@ -91,6 +91,10 @@ def _context() -> Any:
 async def _answer(
     messages: asyncio.Queue[tuple[Any, ...]], progress: Callable[[str, float], None] | None
 ) -> Any:
+    """Return the result of the child process; pass its progress messages to `progress`.
+
+    Raise the error that the child reports.
+    """
     while True:
         kind, *content = await messages.get()
         if kind == "done":
@@ -104,7 +108,10 @@ async def _answer(
 def _read(
     ours: Connection, loop: asyncio.AbstractEventLoop, messages: asyncio.Queue[tuple[Any, ...]]
 ) -> None:
-    """Pass the messages of the child to the event loop; a silent end is reported as a failure."""
+    """Pass the messages of the child to the event loop; a silent end is reported as a failure.
+
+    `ours` is the receiving end of the pipe.
+    """
     kind = "progress"
     with ours, contextlib.suppress(RuntimeError):  # the event loop may be closed already
         while kind == "progress":
@@ -117,6 +124,11 @@ def _read(
 
 
 def _refuse(kind: str, name: str, told: str) -> NoReturn:
+    """Raise the error that a child process reports.
+
+    An MbsError (kind "refused") keeps its class, other failures become a `JobError` and are logged.
+    `told` is the message or traceback.
+    """
     if kind == "refused":
         known = getattr(errors, name, MbsError)
         raise known(told)
@@ -130,13 +142,16 @@ def _refuse(kind: str, name: str, told: str) -> NoReturn:
 def _child(
     theirs: Connection, folder: str, task: Callable[..., Any], document: Document, args: Any
 ) -> None:
-    """Main function of the child process: assemble the robot, run the task, send the result."""
+    """Run a task in the child process: assemble the robot, call the task, send the result.
+
+    `theirs` is the sending end of the pipe, `folder` the folder of temporary files.
+    """
     tempfile.tempdir = folder
     if hasattr(os, "setpgid"):
         os.setpgid(0, 0)  # process group: its own child processes are stopped with it
     threading.Thread(target=_end_with_server, args=(folder,), daemon=True).start()
     try:
-        with listen(_Teller(theirs)):
+        with listen(_ProgressSender(theirs)):
             answer = task(document.system(), *args)
         theirs.send(("done", answer))
     except MbsError as error:
@@ -159,21 +174,25 @@ def _end_with_server(folder: str) -> None:
     os._exit(1)
 
 
-class _Teller:
-    """Sender of progress messages, limited to visible changes."""
+class _ProgressSender:
+    """Callable (label, fraction) that sends progress messages through a pipe.
+
+    Messages are limited to changes that are visible in the progress bar.
+    """
 
     def __init__(self, theirs: Connection) -> None:
         self._theirs = theirs
         self._last: tuple[str, float] = ("", -1.0)
 
     def __call__(self, label: str, part: float) -> None:
+        """Send a label and a completed fraction (0 to 1) if the change is visible."""
         if label != self._last[0] or part >= min(self._last[1] + _STEP, 1.0) > self._last[1]:
             self._last = (label, part)
             self._theirs.send(("progress", label, part))
 
 
-def _end(process: BaseProcess, folder: str) -> None:
-    """Stop the child if it is still running, and remove its temporary files."""
+def _stop_child(process: BaseProcess, folder: str) -> None:
+    """Stop the child process if it is still running, and remove its folder of temporary files."""
     if process.pid is not None:
         process.join(0.05)  # [s] after sending its result, the child is about to end by itself
         if process.is_alive():
@@ -186,7 +205,7 @@ def _end(process: BaseProcess, folder: str) -> None:
 
 
 def _signal(process: BaseProcess, name: str) -> None:
-    """Send a signal to the child and its own child processes."""
+    """Send a signal, such as "SIGTERM", to the child and its own child processes."""
     if sys.platform == "win32" or process.pid is None:
         process.terminate()
         return
@@ -211,7 +230,11 @@ class JobCard:
             self._note = ui.label("starting").classes("app-note")
 
     def on_cancel(self, cancel: Callable[[], Any]) -> None:
-        """Set the action of the cancel button."""
+        """Set the action of the cancel button.
+
+        Args:
+            cancel: function without arguments that stops the job.
+        """
 
         def stop() -> None:
             self._button.disable()
@@ -221,14 +244,19 @@ class JobCard:
         self._button.on_click(stop)
 
     def progress(self, label: str, part: float) -> None:
-        """Show the label of the computation and its completed fraction, 0 to 1."""
+        """Show the label of the computation and the completed fraction.
+
+        Args:
+            label: name of the present step.
+            part: completed fraction from 0 to 1.
+        """
         self._bar.props(remove="indeterminate")
         self._bar.set_value(part)
         self._note.set_text(f"{label}: {100 * part:.0f} %")
 
 
 class JobCards:
-    """Corner of the page that contains the cards."""
+    """Corner of the page that contains the cards of running jobs."""
 
     def __init__(self) -> None:
         self._corner: ui.element | None = None
@@ -239,7 +267,11 @@ class JobCards:
 
     @contextmanager
     def card(self, label: str) -> Iterator[JobCard]:
-        """Show a card while the block runs."""
+        """Show a card of a job while the block runs, and remove it afterwards.
+
+        Args:
+            label: description of the job.
+        """
         assert self._corner is not None, "build comes first"
         with self._corner:
             card = JobCard(label)

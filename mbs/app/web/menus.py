@@ -29,7 +29,7 @@ Act = Callable[[], Awaitable[None] | None]
 
 
 def build_menus(app: App) -> None:
-    """Create the menus at the present position; unavailable models are greyed out.
+    """Create the menus at the present position; models that the robot lacks are greyed out.
 
     Args:
         app: app of the page.
@@ -73,13 +73,18 @@ class _Item:
         self._why.set_visibility(False)
 
     def refuse(self, reason: str) -> None:
-        """Grey the entry out and show the reason; enable it if the reason is empty."""
+        """Disable the entry and show the reason; enable it if the reason is empty.
+
+        Args:
+            reason: reason why the robot does not have the model.
+        """
         self._item.set_enabled(not reason)
         self._why.set_text(reason)
         self._why.set_visibility(bool(reason))
 
 
 def _act(app: App, one: Entry) -> Act:
+    """Return the function that opens the panel of a model."""
     if one.solver is not None:
         return partial(open_configurations, app, one.key)
     if one.key == singular_panel.KEY:
@@ -90,11 +95,13 @@ def _act(app: App, one: Entry) -> Act:
 
 
 def _menu(title: str) -> Any:
+    """Create the button of a menu, and return its menu."""
     with ui.button(title).props("flat no-caps dense").classes("app-menu"):
         return ui.menu()
 
 
 def _plain(title: str, act: Act) -> ui.menu_item:
+    """Create a menu entry with a title and an action."""
     return ui.menu_item(title, on_click=act)
 
 
@@ -105,7 +112,7 @@ _SUFFIXES = ",".join(READERS)
 
 
 class FilesMenu:
-    """Menu Robot and its dialogs."""
+    """Menu Robot with the dialogs that open and save robots."""
 
     def __init__(self, app: App) -> None:
         self._app = app
@@ -126,14 +133,14 @@ class FilesMenu:
         self.refresh()
 
     def refresh(self) -> None:
-        """Grey out the entries that are not available at present."""
+        """Disable the entries that are not available at present."""
         session = self._app.session
         self._undo.set_enabled(bool(session.past))
         self._redo.set_enabled(bool(session.future))
         self._convert.set_visibility(not session.document.is_table)
 
     def choose(self) -> None:
-        """Open a dialog that lists the catalogue to choose from."""
+        """Open a dialog that lists the robots of the catalogue to choose from."""
         with ui.dialog() as dialog, ui.card().style("width: 640px; max-width: 92vw"):
             ui.label("From the catalogue").classes("app-robot")
             field = ui.input(placeholder="Search").props("dense outlined autofocus clearable")
@@ -153,7 +160,7 @@ class FilesMenu:
         dialog.open()
 
     def upload(self) -> None:
-        """Open a dialog for uploading a file."""
+        """Open a dialog for uploading a robot file."""
         with ui.dialog() as dialog, ui.card().style("width: 460px"):
             ui.label("Open a robot file").classes("app-robot")
             ui.label(
@@ -180,12 +187,19 @@ class FilesMenu:
         dialog.open()
 
     async def open_upload(self, name: str, content: bytes) -> None:
-        """Open the robot in an uploaded file; only the suffix of the file name is used."""
+        """Open the robot in an uploaded file; an error is shown.
+
+        Args:
+            name: file name, of which only the suffix is used.
+            content: content of the file.
+        """
         suffix = PurePath(name.replace("\\", "/")).suffix
         if await self._app.open_robot(Document.of_upload, content, suffix):
             self._app.tell(f"{self._app.document.name} is open")
 
     def _row(self, dialog: ui.dialog, name: str, words: str) -> ui.element:
+        """Create the row of a robot in the list of the catalogue; `words` describes the robot."""
+
         async def take() -> None:
             dialog.close()
             await self._app.open_robot(Document.of_name, name)
@@ -197,6 +211,10 @@ class FilesMenu:
         return row
 
     def _item(self, key: str, title: str, act: Any, keys: str = "") -> ui.menu_item:
+        """Create a menu entry with a title and an action `act`, marked by `key` for tests.
+
+        `keys` is the text of its keyboard shortcut.
+        """
         with ui.menu_item(on_click=act).mark(f"robot-{key}") as item:
             ui.label(title)
             if keys:
@@ -205,13 +223,16 @@ class FilesMenu:
         return item
 
     async def _blank(self) -> None:
+        """Open a new robot with a single joint."""
         await self._app.open_robot(Document.blank)
 
     async def _to_table(self) -> None:
-        if await self._app.describe_anew(self._app.document.as_table):
+        """Convert the robot to a table of frames, whose cells can be changed."""
+        if await self._app.show_other_description(self._app.document.as_table):
             self._app.tell("Its links are rows of a table now, and can be changed")
 
     async def _save(self, kind: str) -> None:
+        """Download the robot as a "toml" or "par" file."""
         document = self._app.document
         try:
             text = await self._app.aside(_text, document, kind)
@@ -221,6 +242,7 @@ class FilesMenu:
         self._app.download(text.encode(), f"{document.file_name}.{kind}")
 
     async def _report(self) -> None:
+        """Open a tab with the report of the assembly."""
         try:
             system = self._app.system()
         except MbsError as error:
@@ -232,9 +254,11 @@ class FilesMenu:
 
 
 def _text(document: Document, kind: str) -> str:
+    """Return a robot as the text of a "toml" or "par" file."""
     table = document.as_table()
     return table.toml() if kind == "toml" else table.par()
 
 
 def _first_line(make: Any) -> str:
+    """Return the first line of the docstring of a catalogue function."""
     return (make.__doc__ or "").strip().partition("\n")[0]

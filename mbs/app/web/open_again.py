@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping
-from typing import Any, cast
+from functools import partial
+from typing import cast
 
 from mbs.app.tasks.equations import entries
 from mbs.app.web.app import App
@@ -33,27 +34,22 @@ _OPENERS: Mapping[str, Opener] = {
 
 
 async def open_again(app: App) -> None:
-    """Reopen the tabs of the session, the last visible tab last, and record changes of tabs.
+    """Reopen the tabs that were open before a reload, and record later changes of tabs.
+
+    The tab that was visible is opened last.
 
     Args:
         app: app of the page, with its robot assembled.
     """
     before = cast(tuple[str, ...], app.session.notes.get(_NOTE, ()))
-    app.drawer.on_tabs(lambda names: _note(app, names))
+    app.drawer.on_tabs(partial(app.session.notes.__setitem__, _NOTE))
     if app.session.refusal:
         return
     known = {one.key for one in entries()}
     for name in before:
         if name in _OPENERS:
-            await _finish(_OPENERS[name](app))
+            opening = _OPENERS[name](app)
+            if opening is not None:
+                await opening
         elif name.removeprefix(_EQUATIONS) in known:
             await open_equations(app, name.removeprefix(_EQUATIONS))
-
-
-async def _finish(opening: Any) -> None:
-    if opening is not None:
-        await opening
-
-
-def _note(app: App, names: tuple[str, ...]) -> None:
-    app.session.notes[_NOTE] = names

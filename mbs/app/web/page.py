@@ -22,7 +22,11 @@ _DRAWER = 58.0
 
 
 def page_of(first: Document) -> Callable[[], Awaitable[None]]:
-    """Return the page function whose new visitors start with a given robot."""
+    """Return the function that builds the page of the app for each visitor.
+
+    Args:
+        first: robot with which new visitors start.
+    """
 
     async def app_page() -> None:
         add_head()
@@ -42,12 +46,16 @@ def page_of(first: Document) -> Callable[[], Awaitable[None]]:
 
 
 async def app_page() -> None:
-    """Build the page with the robot RX90."""
+    """Build the page of the app with the robot RX90."""
     await page_of(Document.of_name("rx90"))()
 
 
 def session_of(first: Document) -> Session:
-    """Return the session of this browser tab; a duplicated tab gets its own copy."""
+    """Return the session of this browser tab; a duplicated tab gets its own copy.
+
+    Args:
+        first: robot with which a new session starts.
+    """
     tab = ui.context.client.tab_id
     kept = server.storage.tab.get(_KEY)
     if kept is None:
@@ -61,6 +69,7 @@ def session_of(first: Document) -> Session:
 
 
 def _build(app: App) -> None:
+    """Create menus, tables, picture and drawer of the page."""
     with ui.element("div").classes("app-bar"):
         ui.label("mbs").classes("app-brand")
         with ui.element("div").classes("app-menus"):
@@ -105,6 +114,7 @@ class _Head:
 
 
 def _facts(session: Session) -> str:
+    """Return the numbers of links, coordinates and loops of the robot as text."""
     if session.system is None:
         return ""
     system = session.system
@@ -114,12 +124,17 @@ def _facts(session: Session) -> str:
 
 
 def _small(text: str, words: str, act: Callable[[], Awaitable[None]]) -> ui.button:
+    """Create a small button with a tooltip `words`."""
     button = ui.button(text, on_click=act).props("flat dense no-caps")
     button.tooltip(words)
     return button
 
 
 def _make_room(rows: ui.splitter, filled: bool) -> None:
+    """Show the lower half of the page if there are results (`filled`), else hide it.
+
+    `rows` is the splitter between the halves.
+    """
     if filled and rows.value > 99:
         rows.set_value(_DRAWER)
     elif not filled:
@@ -127,6 +142,8 @@ def _make_room(rows: ui.splitter, filled: bool) -> None:
 
 
 def _keys(app: App) -> None:
+    """Handle the keyboard shortcuts of undo and redo."""
+
     async def pressed(event: events.KeyEventArguments) -> None:
         if not (event.action.keydown and (event.modifiers.ctrl or event.modifiers.meta)):
             return

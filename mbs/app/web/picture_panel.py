@@ -30,13 +30,15 @@ _PAUSE = 0.2
 
 @dataclass(slots=True)
 class _Slider:
+    """Slider of a coordinate with its text field."""
+
     handle: Handle
     slider: ui.slider
     field: ui.input
 
 
 class JointSliders:
-    """Sliders of the joints below the picture."""
+    """Sliders of the joints, dependent joints and assembly modes, below the picture."""
 
     def __init__(self, app: App) -> None:
         self._app = app
@@ -119,6 +121,7 @@ class JointSliders:
             await self._refresh_modes()
 
     async def _refresh_modes(self) -> None:
+        """Show the assembly modes of the present configuration, or why they are not known."""
         system, q = self._app.session.system, self._app.q
         closed = system is not None and system.is_closed
         self._mode_row.set_visibility(closed)
@@ -144,6 +147,7 @@ class JointSliders:
         self._mode_note.set_text(f"{len(found)} with these joints" if found else "")
 
     def _slider(self, handle: Handle) -> _Slider:
+        """Create the slider and the text field of a coordinate."""
         with ui.element("div").classes("app-joint"):
             ui.label(handle.name).classes("app-joint-name").tooltip(_range(handle))
             step = (handle.high - handle.low) / _PART
@@ -168,10 +172,12 @@ class JointSliders:
         self._typed = handle
 
     async def _slid(self, handle: Handle, event: events.GenericEventArguments) -> None:
+        """Move a coordinate to the value of its slider, which the event contains."""
         self._held = handle
         await self._app.move(handle.index, float(event.args))
 
     async def _write(self, item: _Slider) -> None:
+        """Move a coordinate to the position in its text field; show an error if it is no number."""
         self._typed = None
         try:
             value = number(str(item.field.value or ""), item.handle.name)
@@ -181,17 +187,20 @@ class JointSliders:
         await self._app.move(item.handle.index, value)
 
     async def _choose_mode(self, event: events.ValueChangeEventArguments[Any]) -> None:
+        """Show the mechanism in the selected assembly mode."""
         k = event.value
         if isinstance(k, int) and k < len(self._modes) and k != self._shown_mode:
             await self._app.set_configuration(self._modes[k].q)
 
     async def _home(self) -> None:
+        """Show the assembled configuration."""
         system = self._app.session.system
         if system is not None:
             await self._app.set_configuration(system.configuration)
 
 
 def _range(handle: Handle) -> str:
+    """Return the text of the limits of a slider."""
     kind = "limits" if handle.limited else "no limits; the slider goes"
     return f"{handle.name}: {kind} {handle.low:.4g} to {handle.high:.4g} {handle.unit}"
 
@@ -225,7 +234,7 @@ class PicturePanel:
             with ui.element("div").classes("app-view") as self._view:
                 ui.element("div").classes("app-canvas").props(f"id={VIEW}")
                 with ui.element("div").classes("app-over"):
-                    self._chips()
+                    self._view_buttons()
                 self._veil = ui.label().classes("app-veil")
             JointSliders(app)
         app.on_document(self.refresh)
@@ -248,7 +257,8 @@ class PicturePanel:
         else:
             self._view.classes(remove="app-stale")
 
-    def _chips(self) -> None:
+    def _view_buttons(self) -> None:
+        """Create the buttons of visible kinds of elements, view directions and screenshot."""
         with ui.element("div").classes("app-chips"):
             for role, (title, usual) in _ROLES.items():
                 self._toggle(role, title, usual)
@@ -262,12 +272,13 @@ class PicturePanel:
             chip.on("click", self._app.screenshot)
 
     def _is_shown(self, role: str, usual: bool) -> bool:
-        """Return whether a kind of elements is visible: as the user set it, else by default."""
+        """Whether a kind of elements is visible: as the user set it, else by default (`usual`)."""
         session = self._app.session
         covered = session.system is not None and bool(session.system.shapes) and role in COVERED
         return session.shown.get(role, usual and not covered)
 
     def _toggle(self, role: str, title: str, usual: bool) -> None:
+        """Create the button that shows or hides elements of a role; `usual` is their default."""
         with ui.element("button").classes("app-chip") as chip:
             ui.label(title)
 

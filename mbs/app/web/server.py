@@ -85,7 +85,7 @@ class HostFilter:
         self._app = app
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
-        """Pass the request to the app, or answer 403."""
+        """Pass a request of this computer to the app; answer 403 to other requests."""
         if scope["type"] not in ("http", "websocket") or is_local(scope["headers"]):
             await self._app(scope, receive, send)
         elif scope["type"] == "websocket":
@@ -98,7 +98,11 @@ class HostFilter:
 
 
 def is_local(headers: Iterable[tuple[bytes, bytes]]) -> bool:
-    """Return whether host and origin of a request are this computer."""
+    """Whether host and origin of a request are this computer.
+
+    Args:
+        headers: names and values of the HTTP headers.
+    """
     found = {name.lower(): value.decode("latin-1") for name, value in headers}
     origin = found.get(b"origin")
     host = _host(found.get(b"host", ""))
@@ -115,9 +119,9 @@ def robot_document(robot: str, gravity: str = "", mount: Sequence[str] = ()) -> 
     """Return the document of a robot from the catalogue or a file.
 
     Args:
-        robot: name or path.
+        robot: name in the catalogue, or path of a file.
         gravity: "X,Y,Z" [m/s^2] instead of the gravity of the robot; empty to keep it.
-        mount: steps of the mount of the robot.
+        mount: steps of the mount of the robot, such as "x=pi".
 
     Raises:
         MbsError: the robot does not exist or is malformed, or gravity or mount is invalid.
@@ -135,6 +139,10 @@ def robot_document(robot: str, gravity: str = "", mount: Sequence[str] = ()) -> 
 
 
 def _document(robot: str) -> Document:
+    """Return the document of a robot from the catalogue or a file.
+
+    Raise an MbsError if the robot does not exist or the file is malformed.
+    """
     from mbs.app.web.document.document import Document
     from mbs.robots import catalogue
 
@@ -152,6 +160,9 @@ def _document(robot: str) -> Document:
 
 def free_port(port: int | None) -> int:
     """Return the port, or a free port if it is None.
+
+    Args:
+        port: port number from 1 to 65535, or None.
 
     Raises:
         MbsError: the port number is invalid, or the port is in use.

@@ -54,7 +54,11 @@ class Handle:
 
 
 def handles(system: System) -> tuple[Handle, ...]:
-    """Return the coordinates that can be moved: all of an open chain, or the independent ones."""
+    """Return the coordinates that sliders can move: all of an open chain, or the independent ones.
+
+    Args:
+        system: the mechanism.
+    """
     chosen = set(independent_names(system)) if system.is_closed else None
     reach = _reach(system)
     return tuple(
@@ -65,6 +69,10 @@ def handles(system: System) -> tuple[Handle, ...]:
 
 
 def _handle(system: System, index: int, reach: float) -> Handle:
+    """Return the slider of a coordinate: its limits, or a usual range.
+
+    `reach` is the size of the mechanism [m].
+    """
     c = system.coordinates[index]
     if c.limits is not None:
         return Handle(c.name, index, c.unit, c.limits[0], c.limits[1], True)
@@ -84,6 +92,7 @@ def _reach(system: System) -> float:
 
 
 def _number(value: object) -> float:
+    """Return a value as float, 0 if it is an expression."""
     return float(value) if isinstance(value, (int, float)) else 0.0
 
 
@@ -97,7 +106,7 @@ def moved(system: System, q: Sequence[float], index: int, value: float) -> Vecto
         value: new value of the coordinate.
 
     Raises:
-        LoopError: the loops cannot be closed with this value.
+        Unclosable: the loops cannot be closed with this value.
     """
     target = list(q)
     target[index] = value
@@ -119,11 +128,12 @@ def moved(system: System, q: Sequence[float], index: int, value: float) -> Vecto
 
 
 def _held(system: System) -> tuple[int, ...]:
+    """Return the indices in q of the coordinates that the user can move."""
     return tuple(handle.index for handle in handles(system))
 
 
 def _unit(system: System, q: list[float], index: int) -> Vector:
-    """Normalise the quaternions of a configuration, keeping the moved element if possible."""
+    """Return a configuration with unit quaternions; the element `index` is kept if possible."""
     for part in quaternion_slices(system.tree):
         values = np.array(q[part])
         if part.start <= index < part.stop:
@@ -134,7 +144,7 @@ def _unit(system: System, q: list[float], index: int) -> Vector:
 
 
 def _with_part(values: NDArray[np.float64], kept: int) -> NDArray[np.float64]:
-    """Return the unit quaternion with one element kept and the other elements scaled."""
+    """Return the unit quaternion (4,) with one element kept and the other elements scaled."""
     values = values.copy()
     values[kept] = min(max(values[kept], -1.0), 1.0)
     others = [k for k in range(4) if k != kept]
@@ -149,6 +159,11 @@ def carried(old: System | None, q: Sequence[float], new: System) -> Vector:
     """Return the configuration of a changed mechanism that is nearest to the present one.
 
     It is the assembled configuration if the coordinates differ or the loops cannot be closed.
+
+    Args:
+        old: mechanism before the change, or None.
+        q: (nq,) its configuration [rad or m].
+        new: mechanism after the change.
     """
     names = [c.name for c in new.coordinates]
     if old is None or [c.name for c in old.coordinates] != names:
@@ -162,8 +177,12 @@ def carried(old: System | None, q: Sequence[float], new: System) -> Vector:
 def listed_modes(system: System, q: Sequence[float]) -> tuple[Mode, ...] | str:
     """Find all assembly modes of the mechanism with its independent joints as in q.
 
+    Args:
+        system: the mechanism.
+        q: (nq,) configuration [rad or m].
+
     Returns:
-        the modes, or a text that explains why they are not known.
+        The modes, at most 64, or a text that explains why they are not known. Empty without loops.
     """
     if not system.is_closed:
         return ()
@@ -180,7 +199,14 @@ def listed_modes(system: System, q: Sequence[float]) -> tuple[Mode, ...] | str:
 
 
 def mode_of(found: Sequence[Mode], q: Sequence[float]) -> int | None:
-    """Return the index of the mode of a configuration, angles modulo 2 pi; None if not found."""
+    """Return the index of the assembly mode of a configuration, angles modulo 2 pi.
+
+    None if no mode has this configuration.
+
+    Args:
+        found: assembly modes.
+        q: (nq,) configuration [rad or m].
+    """
     for k, mode in enumerate(found):
         apart = np.subtract(mode.q, q)
         turned = np.abs((apart + math.pi) % (2 * math.pi) - math.pi)
@@ -223,7 +249,7 @@ class Session:
     notes: dict[str, object] = field(default_factory=dict)
 
     def doubled(self) -> Session:
-        """Return an independent copy for another tab."""
+        """Return an independent copy of the session for another browser tab."""
         return replace(
             self,
             past=list(self.past),
@@ -233,35 +259,45 @@ class Session:
         )
 
     def change(self, document: Document) -> None:
-        """Replace the present document, which can be restored by undo."""
+        """Replace the present document by another document of the same robot; undo restores it.
+
+        Args:
+            document: new document.
+        """
         if document == self.document:
             return
         self._keep()
         self.document = document
 
     def open(self, document: Document) -> None:
-        """Replace the present robot, which can be restored by undo.
+        """Replace the present robot; undo restores it.
 
         The new robot starts in the configuration of its own description.
+
+        Args:
+            document: document of the new robot.
         """
         self._keep()
         self._enter(document, max([self.robot, *(robot for _, robot in self.past)]) + 1)
 
     def _keep(self) -> None:
-        """Add the present document to the history."""
+        """Add the present document to the history, and forget undone documents."""
         self.past.append((self.document, self.robot))
         del self.past[:-_LONGEST_HISTORY]
         self.future.clear()
 
     def _enter(self, document: Document, robot: int) -> None:
-        """Set the document. The state is reset if the document has another robot number."""
+        """Set the document.
+
+        The state of the present robot is reset if `robot` is another number.
+        """
         self.document = document
         if robot != self.robot:
             self.robot, self.good, self.system, self.tables = robot, None, None, None
             self.q, self.refusal = (), ""
 
     def undo(self) -> bool:
-        """Undo the last change; return whether there was one."""
+        """Undo the last change; return False if there is none."""
         if not self.past:
             return False
         self.future.append((self.document, self.robot))
@@ -269,7 +305,7 @@ class Session:
         return True
 
     def redo(self) -> bool:
-        """Redo the last change that was undone; return whether there was one."""
+        """Redo the last change that was undone; return False if there is none."""
         if not self.future:
             return False
         self.past.append((self.document, self.robot))
@@ -277,7 +313,12 @@ class Session:
         return True
 
     def settle(self, document: Document, q: Vector) -> None:
-        """Set the assembled document to show, in the configuration q (nq,)."""
+        """Set the document that was assembled and its configuration, for display.
+
+        Args:
+            document: document that can be assembled.
+            q: (nq,) configuration [rad or m].
+        """
         self.good, self.system, self.tables = document, document.system(), document.shown()
         self.q, self.refusal = q, ""
 
@@ -291,7 +332,8 @@ class Session:
         """Return the system of the document as typed.
 
         Raises:
-            MbsError: a cell has an error, or the mechanism cannot be assembled.
+            MbsError: a cell has an error, the mechanism cannot be assembled, or the assembly has
+                not ended yet.
         """
         if self.document == self.good and self.system is not None:
             return self.system

@@ -19,7 +19,7 @@ _AGE = 3600
 
 
 def serve_assets() -> None:
-    """Make the server provide the scripts and styles of the app."""
+    """Make the server provide the scripts and styles of the app and of the picture."""
     app.add_static_files(_APP, _ASSETS, max_cache_age=_AGE)
     app.add_static_files(_PICTURE, assets_folder(), max_cache_age=_AGE)
 

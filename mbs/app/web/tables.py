@@ -98,7 +98,7 @@ def columns(sheet: str, *, removable: bool) -> list[dict[str, Any]]:
     """Return the column definitions of the grid of a table.
 
     Args:
-        sheet: name of the table.
+        sheet: name of the table, a key of `SHEETS`.
         removable: whether rows can be removed.
     """
     first = {"geometry": "frame", "inertia": "body", "loops": "loop"}.get(sheet, "name")
@@ -126,6 +126,7 @@ def columns(sheet: str, *, removable: bool) -> list[dict[str, Any]]:
 
 
 def _column(sheet: str, name: str) -> dict[str, Any]:
+    """Return the definition of a column: title, width, tooltip and allowed words."""
     made: dict[str, Any] = {
         "field": name,
         "headerName": _TITLES.get(name, name),
@@ -143,6 +144,7 @@ def _column(sheet: str, name: str) -> dict[str, Any]:
 
 
 def _meaning(sheet: str, name: str) -> str:
+    """Return the tooltip of a column."""
     if sheet == "loops" and name == "joint":
         return "Type of the joint that was cut"
     if sheet == "inertia" and len(name) == 2 and name[0] in "XYZ":
@@ -155,7 +157,14 @@ def _meaning(sheet: str, name: str) -> str:
 def rows(
     tables: Tables, symbols: tuple[str, ...], sheet: str, problems: tuple[CellProblem, ...]
 ) -> list[dict[str, Any]]:
-    """Return the rows of the grid of a table, with the error messages of their cells."""
+    """Return the rows of the grid of a table, with the error messages of their cells.
+
+    Args:
+        tables: cells of the robot.
+        symbols: names of the symbols of the robot.
+        sheet: name of the table, a key of `SHEETS`.
+        problems: errors of cells.
+    """
     made = []
     for k, row in enumerate(_texts(tables, symbols, sheet)):
         bad = {p.column: p.sentence for p in problems if p.sheet == sheet and p.row == k}
@@ -168,6 +177,7 @@ def rows(
 
 
 def _texts(tables: Tables, symbols: tuple[str, ...], sheet: str) -> tuple[tuple[str, ...], ...]:
+    """Return the rows of texts of the table `sheet`, with the values of the given symbols."""
     if sheet == "symbols":
         known = dict(tables.values)
         return tuple((known.get(name, ""),) for name in symbols)
@@ -175,6 +185,7 @@ def _texts(tables: Tables, symbols: tuple[str, ...], sheet: str) -> tuple[tuple[
 
 
 def _row_name(symbols: tuple[str, ...], sheet: str, k: int) -> str:
+    """Return the label of row k: name of a symbol or quantity, else its number."""
     if sheet == "symbols":
         return symbols[k]
     return GENERAL_ROWS[k] if sheet == "general" else str(k + 1)
@@ -216,7 +227,11 @@ class TablePanel:
         self.refresh()
 
     def select(self, sheet: str) -> None:
-        """Show a table; its grid is created at the first call."""
+        """Show a table; its grid is created when it is shown for the first time.
+
+        Args:
+            sheet: name of the table, a key of `SHEETS`.
+        """
         self._sheet = sheet
         self._app.session.notes["sheet"] = sheet
         for name, tab in self._tabs.items():
@@ -239,7 +254,7 @@ class TablePanel:
         wrong = {problem.sheet for problem in problems}
         for sheet, tab in self._tabs.items():
             tab.classes(add="app-tab-bad") if sheet in wrong else tab.classes(remove="app-tab-bad")
-        self._say(problems)
+        self._show_message(problems)
         reason = "" if document.origin is None else document.origin.reason
         self._reason.set_text(reason)
         self._locked.set_visibility(bool(reason))
@@ -257,21 +272,25 @@ class TablePanel:
     def _rows(
         self, document: Document, sheet: str, problems: tuple[CellProblem, ...]
     ) -> list[dict[str, Any]]:
+        """Return the rows of the grid of the table `sheet`, with the problems of its cells."""
         return rows(self._app.session.shown_tables, document.symbols, sheet, problems)
 
-    def _say(self, problems: tuple[CellProblem, ...]) -> None:
+    def _show_message(self, problems: tuple[CellProblem, ...]) -> None:
+        """Show the first error message and the number of further ones."""
         sentences = [problem.sentence for problem in problems] or [self._app.session.refusal]
         more = f" (and {len(sentences) - 1} more)" if len(sentences) > 1 else ""
         self._sentence.set_text(sentences[0] + more)
         self._sentence.set_visibility(bool(sentences[0]))
 
     def _tab(self, sheet: str, title: str) -> ui.element:
+        """Create the button that shows the table `sheet`."""
         with ui.element("button").classes("app-tab") as tab:
             ui.label(title)
         tab.on("click", lambda: self.select(sheet))
         return tab
 
     def _grid(self, sheet: str) -> ui.aggrid:
+        """Create the grid of a table."""
         document = self._app.document
         grid = ui.aggrid(
             {
@@ -305,6 +324,7 @@ class TablePanel:
         return grid
 
     def _row_bar(self, sheet: str) -> None:
+        """Create the button that adds a frame or loop."""
         if sheet not in ("geometry", "loops") or self._is_locked:
             return
         word = "frame" if sheet == "geometry" else "loop"
@@ -318,11 +338,13 @@ class TablePanel:
             ).classes("app-note")
 
     async def _type(self, sheet: str, event: events.GenericEventArguments) -> None:
+        """Change the cell that the user has edited, with the text that the event contains."""
         text = event.args.get("newValue")
         cell = Cell(sheet, int(event.args["rowIndex"]), str(event.args["colId"]))
         await self._app.edit(cell, "" if text is None else str(text))
 
     async def _clicked(self, sheet: str, event: events.GenericEventArguments) -> None:
+        """Remove a frame or loop if the user clicked its remove button."""
         if event.args.get("colId") != "remove":
             return
         document, row = self._app.document, int(event.args["rowIndex"])
@@ -335,6 +357,7 @@ class TablePanel:
         await self._app.change(fewer)
 
     async def _add(self, sheet: str) -> None:
+        """Add a frame or loop."""
         document = self._app.document
         try:
             more = document.with_frame() if sheet == "geometry" else document.with_loop()

@@ -29,6 +29,9 @@ LANGUAGES = (*_CLASSES, *_ALIASES)
 def language_of(name: object) -> Language:
     """Return the language with a name (case-insensitive). A `Language` is returned unchanged.
 
+    Args:
+        name: name in `LANGUAGES`, or a `Language`.
+
     Raises:
         ModelError: the language is unknown.
     """

@@ -33,13 +33,13 @@ _FUNCTION: _Key = ("function", 0, 0)
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Names in a text, valid in its language.
+    """Names of a function, its arguments, elements and lines, which are valid in a language.
 
     Attributes:
         function: name of the function.
         arguments: names of inputs, then of outputs.
-        elements: names of the elements of each argument that are not zero.
-        nodes: dict from node index to name, for lines and elements of inputs.
+        elements: names of the structurally nonzero elements of each argument.
+        nodes: name by node index, for lines and elements of inputs.
     """
 
     function: str
@@ -51,10 +51,11 @@ class Names:
 def spelled_names(
     graph: Graph, language: Language, lines: Mapping[int, str], elements: Sequence[Sequence[str]]
 ) -> Names:
-    """Return valid, distinct names. In a conflict, an argument keeps its name.
+    """Return valid, distinct names of arguments, elements and lines.
 
-    An input or output with the name of its only element is the same variable as the element. An
-    output element with the name of the line that computes it is the same variable as the line.
+    If two desired names are equal, an argument keeps its name. An input or output with the name of
+    its only element is the same variable as the element. An output element with the name of the
+    line that computes it is the same variable as the line.
 
     Args:
         graph: graph from `arrange`.
@@ -87,6 +88,7 @@ def spelled_names(
 
 
 def _own_keys(k: int, argument: str, elements: Sequence[str]) -> list[_Key]:
+    """Return the keys of the elements of argument k; an only element of its name shares its key."""
     if list(elements) == [argument]:
         return [("argument", k, 0)]
     return [("element", k, e) for e in range(len(elements))]
@@ -99,7 +101,10 @@ def _unite(
     keys: list[list[_Key]],
     nodes: dict[int, _Key],
 ) -> None:
-    """Unify keys: input nodes with input elements, and output elements with their lines."""
+    """Unify keys of equal variables in `keys` and `nodes`, which are changed.
+
+    Input nodes share the keys of input elements, and output elements those of their lines.
+    """
     for number, node in enumerate(graph.nodes):
         if node.op == casadi.OP_INPUT:
             nodes[number] = keys[node.args[0]][node.args[1]]
@@ -115,6 +120,7 @@ def _unite(
 def _pairs(
     keys: Sequence[Sequence[_Key]], names: Sequence[Sequence[str]]
 ) -> list[tuple[_Key, str]]:
+    """Return the pairs of key and name of the elements of all arguments."""
     return [
         pair
         for some, wanted in zip(keys, names, strict=True)
@@ -142,8 +148,9 @@ def negate_nodes(graph: Graph, numbers: Iterable[int]) -> tuple[Graph, dict[int,
         numbers: indices of nodes to negate, with operations in `NEGATABLE`.
 
     Returns:
-        Graph in which uses of a negated node are preceded by a sign, and dict from old to new node
-        index. For a negated node it is the index of the negative.
+        Graph in which the uses of a negated node are preceded by a sign, and the new index of each
+        node by its old index. For a negated node it is the index of the node with the negative
+        value.
     """
     wanted = set(numbers)
     nodes: list[Node] = []
@@ -178,7 +185,14 @@ _PARAMETERS = ("p",)
 def build(function: Function, language: Language, name: str) -> CodeUnit:
     """Convert a Function to lines of code with names that are valid in a language.
 
-    name: name of the function in the text.
+    Args:
+        function: Function of scalar operations, or a Function that can be expanded to them.
+        language: language of the text.
+        name: name of the function in the text.
+
+    Raises:
+        ModelError: the Function has operations without a scalar expansion, or constants that are
+            not finite.
     """
     graph, given, reserved = _graph(function, name)
     inputs, outputs = (
@@ -215,7 +229,10 @@ def build(function: Function, language: Language, name: str) -> CodeUnit:
 
 
 def _graph(function: Function, name: str) -> tuple[Graph, dict[int, str], set[str]]:
-    """Return the graph of a Function, the names of its nodes in the model, and all these names."""
+    """Return the graph of a Function, the names of its nodes in the model, and all these names.
+
+    `name` becomes the name of the graph.
+    """
     annotated = getattr(function, "annotated", None)
     named = annotated() if annotated is not None else None
     graph = graph_of(function if named is None else named)
@@ -233,7 +250,10 @@ def _graph(function: Function, name: str) -> tuple[Graph, dict[int, str], set[st
 
 
 def _named(graph: Graph, pairs: Sequence[tuple[int, str]]) -> tuple[Graph, dict[int, str]]:
-    """Return the graph and the names of its nodes; nodes whose negative has a name are negated."""
+    """Return a graph and the names of its nodes, from pairs of node and name.
+
+    A node whose negative has a name is computed with the opposite sign.
+    """
     alive = graph.live()
     given: dict[int, str] = {}
     opposite: dict[int, str] = {}
@@ -253,18 +273,20 @@ def _named(graph: Graph, pairs: Sequence[tuple[int, str]]) -> tuple[Graph, dict[
 
 
 def _element_names(function: Function, port: Port, language: Language) -> list[str]:
+    """Return the names of the elements of an input or output in a language."""
     names = element_names(port, elements_of(function, port.name))
     return names if language.scalars_by_name or names != [port.name] else [f"{port.name}1"]
 
 
 def _is_scalar(function: Function, port: Port) -> bool:
+    """Whether an input or output is a scalar, and not a vector with a single named element."""
     return port.sparsity.shape == (1, 1) and not elements_of(function, port.name)
 
 
 def _result_names(graph: Graph, outputs: Sequence[Sequence[str]]) -> Iterator[tuple[int, str]]:
-    """Yield node and name of output elements by rows.
+    """Yield (node, name) of the output elements row by row.
 
-    A symmetric matrix thus gets the names of its upper triangle.
+    A symmetric matrix thus gets the names of its upper triangle. Inputs and constants are left out.
     """
     for port, result, names in zip(graph.outputs, graph.results, outputs, strict=True):
         rows = zip(places(port), result, names, strict=True)
@@ -274,7 +296,10 @@ def _result_names(graph: Graph, outputs: Sequence[Sequence[str]]) -> Iterator[tu
 
 
 def _line_names(plan: LinePlan, wanted: dict[int, str], reserved: set[str]) -> dict[int, str]:
-    """Return the name of each line by node index: its own name, or Z1, Z2, ...."""
+    """Return the name of each line by node index: its name in `wanted`, or else Z1, Z2, ....
+
+    `reserved` are names that must not be used for other lines.
+    """
     names: dict[int, str] = {}
     taken = reserved.union(wanted.values())
     free = (name for k in itertools.count(1) if (name := f"Z{k}") not in taken)
@@ -284,6 +309,7 @@ def _line_names(plan: LinePlan, wanted: dict[int, str], reserved: set[str]) -> d
 
 
 def _loads(graph: Graph, arguments: Sequence[Argument], names: Names) -> Iterator[Load]:
+    """Yield the assignments of the elements of inputs (`arguments`) that are used."""
     used = sorted(
         (node.args, number) for number, node in enumerate(graph.nodes) if node.op == casadi.OP_INPUT
     )
@@ -293,6 +319,7 @@ def _loads(graph: Graph, arguments: Sequence[Argument], names: Names) -> Iterato
 
 
 def _stores(graph: Graph, arguments: Sequence[Argument], names: Names) -> Iterator[Store]:
+    """Yield the assignments of the elements of outputs (`arguments`) that are not zero."""
     labels = names.elements[len(graph.inputs) :]
     rows = zip(graph.outputs, graph.results, arguments, labels, strict=True)
     for port, result, argument, some in rows:
@@ -303,6 +330,7 @@ def _stores(graph: Graph, arguments: Sequence[Argument], names: Names) -> Iterat
 
 
 def _value(graph: Graph, number: int, names: Names) -> Expr:
+    """Return a node as a sympy number or symbol."""
     node = graph.nodes[number]
     if node.op == casadi.OP_CONST:
         return number_of(node.value)

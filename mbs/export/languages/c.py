@@ -9,11 +9,10 @@ from sympy.printing.c import C99CodePrinter
 
 from mbs.export._c_library import parameter_names
 from mbs.export.languages.language import (
-    Argument,
     CodeUnit,
     Language,
     kept_inside,
-    sections,
+    section_lines,
     value_text,
     wrap,
 )
@@ -36,17 +35,23 @@ class C(Language):
     suffix = ".c"
     scalars_by_name = False
     squares_as_products = True
+    by_columns = True
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in C."""
         return printer_of(C99CodePrinter, self.title, repr, _FORMS, "pow({0}, {1})")
 
     def is_reserved(self, name: str) -> bool:
-        """Whether C, its library or C++ uses the name."""
+        """Whether C, its library or C++ reserves a name."""
         return parameter_names([name], ["k"]) != [name]
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the C text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         yield "/*"
         yield from (f" * {line}".rstrip() for line in kept_inside(unit.header, in_c_comment))
         yield from (" */", "#include <math.h>", "")
@@ -55,23 +60,20 @@ class C(Language):
         yield from wrap(f"void {unit.name}({', '.join(arguments) or 'void'})")
         yield "{"
         yield from (f"    const double {load};" for load in self.loads(unit))
-        for title, lines in sections(unit):
-            if title:
-                yield f"\n    /* {title} */"
-            for line in lines:
-                yield from wrap(
-                    f"const double {line.name} = {value_text(line, printer, _CHOICE)};", "    "
-                )
+        yield from section_lines(
+            unit,
+            "\n    /* {} */",
+            lambda line: wrap(
+                f"const double {line.name} = {value_text(line, printer, _CHOICE)};", "    "
+            ),
+        )
         yield from self._stores(unit, printer)
         yield "}"
 
     def _stores(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
+        """Yield the assignments of all outputs."""
         for out in unit.outputs:
             yield ""
             if unit.has_zeros(out):
                 yield f"    for (int k = 0; k < {out.size}; ++k) {out.name}[k] = 0.0;"
             yield from (f"    {store};" for store in self.stores(unit, out, printer))
-
-    def place(self, argument: Argument, row: int, column: int) -> str:
-        """Return the text of an element of an input or output. row, column: 0-based."""
-        return f"{argument.name}[{row + argument.rows * column}]"

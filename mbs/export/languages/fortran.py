@@ -13,7 +13,7 @@ from mbs.export.languages.language import (
     Language,
     branches,
     comment_lines,
-    sections,
+    section_lines,
     wrap,
 )
 from mbs.export.languages.symbolic import printer_of
@@ -59,12 +59,17 @@ class Fortran(Language):
     longest_name = 31
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in Fortran."""
         signs = {"Unequality": "/="}
         return printer_of(FCodePrinter, self.title, _number, _FORMS, "{0}**{1}", signs, _JOINS)
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the Fortran text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         yield from comment_lines(unit.header, "!")
         arguments = [*unit.inputs, *unit.outputs]
         names = ", ".join(argument.name for argument in arguments)
@@ -78,15 +83,14 @@ class Fortran(Language):
         yield ""
         for load in self.loads(unit):
             yield from _statement(load)
-        for title, lines in sections(unit):
-            if title:
-                yield f"\n  ! {title}"
-            for line in lines:
-                yield from branches(line, printer, _BRANCHES, _statement)
+        yield from section_lines(
+            unit, "\n  ! {}", lambda line: branches(line, printer, _BRANCHES, _statement)
+        )
         yield from self._stores(unit, printer)
         yield f"end subroutine {unit.name}"
 
     def _stores(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
+        """Yield the assignments of all outputs."""
         for out in unit.outputs:
             yield ""
             if unit.has_zeros(out):
@@ -96,15 +100,18 @@ class Fortran(Language):
 
 
 def _number(value: float) -> str:
+    """Return a constant in double precision."""
     text = repr(value)
     return text.replace("e", "d") if "e" in text else f"{text}d0"
 
 
 def _statement(text: str, indent: str = "  ") -> list[str]:
+    """Return a statement broken into lines with continuation marks."""
     return wrap(text, indent, _CONTINUED, _COLUMNS)
 
 
 def _title(name: str, arguments: str) -> list[str]:
+    """Return the subroutine statement as lines."""
     line = f"subroutine {name}({arguments})"
     if len(line) <= _COLUMNS:
         return [line]
@@ -112,6 +119,7 @@ def _title(name: str, arguments: str) -> list[str]:
 
 
 def _declare(argument: Argument) -> str:
+    """Return the declaration of an argument: its name with its shape."""
     if argument.scalar:
         return argument.name
     shape = f"{argument.rows}" if argument.is_vector else f"{argument.rows},{argument.columns}"
@@ -119,5 +127,6 @@ def _declare(argument: Argument) -> str:
 
 
 def _declarations(names: Sequence[str]) -> Iterator[str]:
+    """Yield the declarations of local variables."""
     for k in range(0, len(names), _NAMES_A_LINE):
         yield from _statement(f"double precision :: {', '.join(names[k : k + _NAMES_A_LINE])}")

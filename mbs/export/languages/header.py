@@ -29,27 +29,48 @@ Elements = Sequence[tuple[str, str]]
 
 
 class MatrixElement(NamedTuple):
-    """Position of a matrix element, 0-based."""
+    """Position of a matrix element.
+
+    Attributes:
+        row, column: indices from 0.
+    """
 
     row: int
     column: int
 
 
 class Term(NamedTuple):
-    """Joint angle, with sign +1 or -1, in a sum of joint angles."""
+    """Joint angle in a sum of joint angles.
+
+    Attributes:
+        sign: +1 or -1.
+        label: label of the joint, such as "2" for q2; "off" for a constant.
+    """
 
     sign: int
     label: str
 
 
 def elements_of(function: Function, name: str) -> Elements:
-    """Return names and units of the elements of an input or output, empty if it has none."""
+    """Return names and units of the elements of an input or output.
+
+    Args:
+        function: model, or another Function.
+        name: name of the input or output.
+
+    Returns:
+        (name, unit) of each element; empty if the elements have no names.
+    """
     known = getattr(function, "elements", None)
     return list(known(name)) if known is not None else []
 
 
 def places(port: Port) -> list[MatrixElement]:
-    """Return the positions of the structural nonzeros of an input or output."""
+    """Return row and column of the structural nonzeros of an input or output, column by column.
+
+    Args:
+        port: input or output of a graph.
+    """
     rows, columns = port.sparsity.get_triplet()
     return [MatrixElement(int(row), int(column)) for row, column in zip(rows, columns, strict=True)]
 
@@ -60,6 +81,10 @@ def element_names(port: Port, elements: Elements) -> list[str]:
     Coordinates and parameters keep their names. Velocities are QP1, QP2, ..., accelerations QDP1,
     ..., efforts GAM1, .... Other elements are named by row and column, such as A12 and H3, or by
     row and column name if the columns have names, such as D3_XX6.
+
+    Args:
+        port: input or output of a graph.
+        elements: names and units of its elements; empty if they have no names.
     """
     rows, columns = port.sparsity.shape
     if (rows, columns) == (1, 1) and not elements:
@@ -96,12 +121,14 @@ def angle_names(graph: Graph, inputs: Sequence[Sequence[str]]) -> dict[int, str]
 
 
 def _angle_order(name: str) -> tuple[bool, int, str, bool]:
+    """Return the sort key of an angle name: single angles by joint number, then sums."""
     label = name[1:]
     number = int(label) if label.isdigit() else 0
     return not number, number, label, name[0] == "C"
 
 
 def _angle_names(graph: Graph, inputs: Sequence[Sequence[str]]) -> Iterator[tuple[int, str]]:
+    """Yield (node, name) of the sines and cosines of joint angles and of their sums."""
     sums: dict[int, tuple[Term, ...] | None] = {}
     apart = any(re.fullmatch(r"q\d\d+", name) for names in inputs for name in names)
     for number, node in enumerate(graph.nodes):
@@ -122,7 +149,10 @@ def _sum_of_angles(
     sums: Mapping[int, tuple[Term, ...] | None],
     inputs: Sequence[Sequence[str]],
 ) -> tuple[Term, ...] | None:
-    """Return the joint angles of which a node is the sum, or None if it is no such sum."""
+    """Return the joint angles of which node `number` is the sum, or None if it is no such sum.
+
+    `sums` gives this for previous nodes, `inputs` the names of the elements of each input.
+    """
     node = graph.nodes[number]
     if node.op == casadi.OP_INPUT:
         return (Term(1, joint_label(inputs[node.args[0]][node.args[1]])),)
@@ -159,6 +189,7 @@ def _join(terms: Sequence[Term], apart: bool) -> str:
 
 
 def _order(term: Term) -> tuple[bool, int, str]:
+    """Return the sort key of an angle in a sum: added angles first, by joint number."""
     number = int(term.label) if term.label.isdigit() else 0
     return term.sign < 0, number, term.label
 
@@ -205,6 +236,10 @@ def header(
 def _argument(
     direction: str, port: Port, argument: Argument, elements: Elements, names: Sequence[str]
 ) -> Iterator[str]:
+    """Yield the header lines of an argument: shape, and names and units of its elements.
+
+    `direction` is "input " or "output".
+    """
     size = "" if argument.scalar else f" ({port.sparsity.size1()}, {port.sparsity.size2()})"
     text = f"{direction} {argument.name}{size}"
     if elements and len(elements) == len(names):
@@ -228,6 +263,7 @@ def _meaning(name: str, element: str) -> str:
 
 
 def _cost(graph: Graph) -> str:
+    """Return the sentence that gives the operation counts of a graph."""
     count = count_graph(graph)
     text = f"Operations: {_tally(count)}."
     once = count.parameter_only
@@ -237,11 +273,13 @@ def _cost(graph: Graph) -> str:
 
 
 def _tally(count: Count) -> str:
+    """Return operation counts as text, "none" if there are no operations."""
     numbers = ((getattr(count, key), words) for key, words in _KINDS.items())
     return ", ".join(f"{n} {words[n > 1]}" for n, words in numbers if n) or "none"
 
 
 def _paragraph(text: str) -> list[str]:
+    """Return a text wrapped into lines; a unit stays on the line of its quantity."""
     together = re.sub(r" \[", "\0[", ascii_line(text))
     lines = textwrap.wrap(together, _WIDTH, subsequent_indent="    ")
     return [line.replace("\0", " ") for line in lines]
@@ -252,6 +290,9 @@ def tables(function: Function) -> tuple[str, ...]:
 
     The table is empty for a Function without a system. A fixed frame on the path to link 4 has the
     number 4.1 and sigma 2.
+
+    Args:
+        function: model, or another Function.
     """
     system = getattr(function, "system", None)
     if system is None:
@@ -273,4 +314,5 @@ def tables(function: Function) -> tuple[str, ...]:
 
 
 def _cell(value: Any) -> str:
+    """Return a parameter with ten digits, or as an expression."""
     return str(value) if isinstance(value, casadi.SX) else f"{value:.10g}"

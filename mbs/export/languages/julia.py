@@ -13,7 +13,7 @@ from mbs.export.languages.language import (
     Language,
     comment_lines,
     grid_texts,
-    sections,
+    section_lines,
     value_text,
     wrap,
 )
@@ -52,20 +52,25 @@ class Julia(Language):
     brackets = "[", "]"
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in Julia."""
         return printer_of(JuliaCodePrinter, self.title, repr, _FORMS, "{0}^{1}")
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the Julia text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         yield from comment_lines(unit.header, "#")
         arguments = ", ".join(argument.name for argument in unit.inputs)
         yield from wrap(f"function {unit.name}({arguments})")
         yield from (f"    {load}" for load in self.loads(unit))
-        for title, lines in sections(unit):
-            if title:
-                yield f"\n    # {title}"
-            for line in lines:
-                yield from wrap(f"{line.name} = {value_text(line, printer, _CHOICE)}", "    ")
+        yield from section_lines(
+            unit,
+            "\n    # {}",
+            lambda line: wrap(f"{line.name} = {value_text(line, printer, _CHOICE)}", "    "),
+        )
         yield ""
         for out in unit.outputs:
             yield from _output(unit, out, printer)
@@ -74,6 +79,7 @@ class Julia(Language):
 
 
 def _output(unit: CodeUnit, out: Argument, printer: Any) -> Iterator[str]:
+    """Yield the lines that create an output."""
     grid = grid_texts(unit, out, printer, "0.0")
     if not out.size:
         yield f"    {out.name} = zeros({out.rows}, {out.columns})"

@@ -45,7 +45,13 @@ class Argument:
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """Assignment of an input element to a name. row, column: 0-based position of the element."""
+    """Assignment of an input element to a name.
+
+    Attributes:
+        name: name in the text.
+        argument: input.
+        row, column: position of the element, 0-based.
+    """
 
     name: str
     argument: Argument
@@ -73,7 +79,14 @@ class Store:
 
 @dataclass(frozen=True, slots=True)
 class CodeLine:
-    """Assignment name = value, or name = value if condition else otherwise."""
+    """Assignment of an expression, or of one of two expressions, to a name.
+
+    Attributes:
+        name: assigned name.
+        value: expression; with a condition, the expression if the condition holds.
+        condition: condition, or None.
+        otherwise: expression if the condition does not hold.
+    """
 
     name: str
     value: Expr
@@ -114,15 +127,27 @@ class CodeUnit:
         return [item.name for item in named if item.name not in arguments]
 
     def stores_of(self, argument: Argument) -> Sequence[Store]:
-        """Return the assignments of the elements of an output."""
+        """Return the assignments of the nonzero elements of an output.
+
+        Args:
+            argument: output.
+        """
         return [store for store in self.stores if store.argument is argument]
 
     def has_zeros(self, argument: Argument) -> bool:
-        """Whether an element of an output is structurally zero."""
+        """Whether an element of an output is structurally zero.
+
+        Args:
+            argument: output.
+        """
         return len(self.stores_of(argument)) < argument.size
 
     def grid(self, argument: Argument) -> list[list[Expr]]:
-        """Return the values of an output as a list of rows, None for zeros."""
+        """Return the values of an output as a list of rows, with None for zeros.
+
+        Args:
+            argument: output.
+        """
         grid: list[list[Expr]] = [[None] * argument.columns for _ in range(argument.rows)]
         for store in self.stores_of(argument):
             grid[store.row][store.column] = store.value
@@ -149,6 +174,8 @@ class Language(ABC):
         scalars_by_name: whether a scalar input or output is a variable, in contrast to an array
             with a single element.
         squares_as_products: whether x^2 is written x*x.
+        by_columns: whether an argument is an array of its elements column by column, with indices
+            from 0.
         brackets: brackets around the indices of an element.
         first: index of the first row and column.
     """
@@ -161,6 +188,7 @@ class Language(ABC):
     tail = "_"
     scalars_by_name = True
     squares_as_products = False
+    by_columns = False
     brackets = "(", ")"
     first = 1
 
@@ -170,45 +198,78 @@ class Language(ABC):
 
     @abstractmethod
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
 
     def text(self, unit: CodeUnit) -> str:
-        """Return the text of a function."""
+        """Return the complete text of a function.
+
+        Args:
+            unit: function to write.
+        """
         return "\n".join(self.lines(unit, self.printer())) + "\n"
 
     def place(self, argument: Argument, row: int, column: int) -> str:
-        """Return the text of an element of an input or output. row, column: 0-based."""
+        """Return the text of an element of an input or output, such as "q(2)".
+
+        Args:
+            argument: input or output.
+            row: row of the element, 0-based.
+            column: column of the element, 0-based.
+        """
         if argument.scalar and self.scalars_by_name:
             return argument.name
+        if self.by_columns:
+            return f"{argument.name}[{row + argument.rows * column}]"
         row, column = row + self.first, column + self.first
         inside = f"{row}" if argument.is_vector else f"{row}, {column}"
         return inside.join((argument.name + self.brackets[0], self.brackets[1]))
 
     def loads(self, unit: CodeUnit) -> Iterator[str]:
-        """Yield `name = element` for the input elements that are used."""
+        """Yield statements `name = element` for the input elements that are used.
+
+        Args:
+            unit: function to write.
+        """
         for load in unit.loads:
             place = self.place(load.argument, load.row, load.column)
             if place != load.name:
                 yield f"{load.name} = {place}"
 
     def stores(self, unit: CodeUnit, out: Argument, printer: Any) -> Iterator[str]:
-        """Yield `element = value` for the elements of an output that are not zero."""
+        """Yield statements `element = value` for the elements of an output that are not zero.
+
+        Args:
+            unit: function to write.
+            out: output.
+            printer: printer of sympy expressions from `printer`.
+        """
         for store in unit.stores_of(out):
             place, value = self.place(out, store.row, store.column), printer.text(store.value)
             if place != value:
                 yield f"{place} = {value}"
 
     def legal(self, name: str) -> str:
-        """Return the name with invalid characters replaced."""
+        """Return the name with characters replaced that the language does not allow."""
         name = re.sub(r"\W", "_", name, flags=re.ASCII).lstrip("_")
         return name if name[:1].isalpha() else f"x{name}"
 
     def is_reserved(self, name: str) -> bool:
-        """Whether the language reserves the name."""
+        """Whether the language reserves a name."""
         return self._fold(name) in self.reserved
 
     def distinct(self, names: Iterable[str]) -> list[str]:
-        """Return valid, distinct names. Of equal names the first is kept, the next get a tail."""
+        """Return valid, distinct names.
+
+        Of equal names the first is kept, others get the suffix `tail`.
+
+        Args:
+            names: desired names.
+        """
         used: set[str] = set()
         result = []
         for wanted in names:
@@ -220,9 +281,11 @@ class Language(ABC):
         return result
 
     def _fold(self, name: str) -> str:
+        """Return the name in lower case if the language ignores case."""
         return name.lower() if self.folds_case else name
 
     def _spellings(self, name: str) -> Iterator[str]:
+        """Yield a name and variants of it with suffixes, each short enough for the language."""
         longest = self.longest_name or len(name) + 9
         yield name[:longest]
         count = 1
@@ -233,12 +296,16 @@ class Language(ABC):
 
 
 def plain_number(value: float) -> str:
-    """Write a constant with all digits, whole numbers without a decimal point."""
+    """Return a constant with all digits, and whole numbers without a decimal point.
+
+    Args:
+        value: finite number.
+    """
     return repr(value).removesuffix(".0")
 
 
 def wrap(text: str, indent: str = "", mark: str = "", width: int = WIDTH) -> list[str]:
-    """Break a statement after operators into indented lines.
+    """Return a statement broken after operators into indented lines.
 
     Args:
         text: statement.
@@ -256,7 +323,12 @@ def wrap(text: str, indent: str = "", mark: str = "", width: int = WIDTH) -> lis
 
 
 def comment_lines(header: Sequence[str], mark: str) -> Iterator[str]:
-    """Yield header lines as line comments that begin with `mark`."""
+    """Yield header lines as line comments.
+
+    Args:
+        header: lines of the header.
+        mark: beginning of a line comment in the language.
+    """
     yield from (f"{mark} {line}".rstrip() for line in kept_inside(header, in_line_comment))
 
 
@@ -288,7 +360,13 @@ def value_text(line: CodeLine, printer: Any, choice: str) -> str:
 
 
 def sections(unit: CodeUnit) -> Iterator[tuple[str, Sequence[CodeLine]]]:
-    """Yield pairs of comment and lines: lines that depend only on parameters, then all others."""
+    """Yield pairs of comment and lines: lines that depend only on parameters, then all others.
+
+    The comment is empty if no line depends only on parameters.
+
+    Args:
+        unit: function to write.
+    """
     if unit.fixed:
         yield "Parameters only: these may be computed once.", unit.fixed
         yield "The model.", unit.changing
@@ -296,8 +374,32 @@ def sections(unit: CodeUnit) -> Iterator[tuple[str, Sequence[CodeLine]]]:
         yield "", unit.changing
 
 
+def section_lines(
+    unit: CodeUnit, comment: str, statement: Callable[[CodeLine], Iterable[str]]
+) -> Iterator[str]:
+    """Yield the text lines of all lines of code, with a comment before each section.
+
+    Args:
+        unit: function to write.
+        comment: format of a comment, with `{}` for its text.
+        statement: function that returns the text lines of a line of code.
+    """
+    for title, lines in sections(unit):
+        if title:
+            yield comment.format(title)
+        for line in lines:
+            yield from statement(line)
+
+
 def grid_texts(unit: CodeUnit, out: Argument, printer: Any, zero: str) -> list[list[str]]:
-    """Return the texts of the elements of an output as a list of rows, `zero` for zeros."""
+    """Return the texts of the elements of an output as a list of rows.
+
+    Args:
+        unit: function to write.
+        out: output.
+        printer: printer of expressions.
+        zero: text of elements that are zero.
+    """
     return [[zero if e is None else printer.text(e) for e in row] for row in unit.grid(out)]
 
 

@@ -41,9 +41,11 @@ class _Printer(LatexPrinter):  # type: ignore[misc]
     """Printer of sympy with all digits of numbers, dotted q for QP and QDP, and Gamma for GAM."""
 
     def text(self, expr: Any) -> str:
+        """Return an expression in LaTeX notation."""
         return str(self._print(expr))
 
     def _print(self, expr: Any, **kwargs: Any) -> Any:
+        """Return an expression in LaTeX notation, with the forms of this module."""
         name = type(expr).__name__
         if name in _JOINS:
             parts = (rf"\left({self._print(arg)}\right)" for arg in expr.args)
@@ -54,9 +56,11 @@ class _Printer(LatexPrinter):  # type: ignore[misc]
         return form % tuple(self._print(arg) for arg in expr.args)
 
     def _print_Symbol(self, expr: Any, style: str = "plain") -> str:
+        """Return a symbol in LaTeX notation, such as a dotted q for QP2."""
         return symbol_text(expr.name)
 
     def _print_Float(self, expr: Any) -> str:
+        """Return a number with all digits, with a power of ten for its exponent."""
         mantissa, _, exponent = plain_number(float(expr)).partition("e")
         return rf"{mantissa} \cdot 10^{{{int(exponent)}}}" if exponent else mantissa
 
@@ -68,11 +72,16 @@ class Latex(Language):
     suffix = ".tex"
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in LaTeX."""
         return _Printer({"order": "none", "mul_symbol": r" \, ", "fold_short_frac": False})
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the LaTeX text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         yield from comment_lines(unit.header, "%")
         yield from (r"\documentclass{article}", r"\usepackage{amsmath}", r"\allowdisplaybreaks")
         yield r"\begin{document}"
@@ -90,7 +99,11 @@ class Latex(Language):
 
 
 def symbol_text(name: str) -> str:
-    """Return a name in LaTeX notation: a dotted q for QP2, index 23 for S23."""
+    """Return a name in LaTeX notation: a dotted q for QP2, index 23 for S23.
+
+    Args:
+        name: name of a scalar.
+    """
     rate = re.fullmatch(r"(QP|QDP|GAM)(\w+)", name)
     if rate:
         return f"{_ACCENTS[rate[1]]}_{{{_escape(rate[2])}}}"
@@ -101,24 +114,29 @@ def symbol_text(name: str) -> str:
 
 
 def _letters(name: str) -> str:
+    """Return a name in italics, escaped."""
     return name if len(name) == 1 else rf"\mathit{{{_escape(name)}}}"
 
 
 def _escape(name: str) -> str:
+    """Return a name with escaped underscores."""
     return name.replace("_", r"\_")
 
 
 def _left(name: str) -> str:
+    """Return the left-hand side of an equation with the alignment mark."""
     return f"{symbol_text(name)} &= "
 
 
 def _align(equations: Iterator[str]) -> Iterator[str]:
+    """Yield an align* environment of equations."""
     yield r"\begin{align*}"
     yield " \\\\\n".join("\n".join(_break_lines(equation)) for equation in equations)
     yield r"\end{align*}"
 
 
 def _value(line: CodeLine, printer: Any) -> str:
+    """Return the right-hand side of an equation; a condition becomes a cases environment."""
     value = printer.text(line.value)
     if line.condition is None:
         return str(value)
@@ -130,7 +148,7 @@ def _value(line: CodeLine, printer: Any) -> str:
 
 
 def _break_lines(equation: str) -> Iterator[str]:
-    """Break a long equation before + and - outside brackets. Yields the lines."""
+    """Yield the lines of a long equation, broken before + and - outside brackets."""
     line, depth = "", 0
     for piece in re.split(r"(?= [+-] )", equation):
         if len(line) + len(piece) > _LONGEST and line and depth == 0:

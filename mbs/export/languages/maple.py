@@ -14,7 +14,7 @@ from mbs.export.languages.language import (
     comment_lines,
     grid_texts,
     plain_number,
-    sections,
+    section_lines,
     value_text,
     wrap,
 )
@@ -57,25 +57,30 @@ class Maple(Language):
     brackets = "[", "]"
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in Maple."""
         signs = {"Equality": "=", "Unequality": "<>"}
         return printer_of(
             MapleCodePrinter, self.title, plain_number, _FORMS, "{0}^{1}", signs, _JOINS
         )
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the Maple text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         yield from comment_lines(unit.header, "#")
         arguments = ", ".join(argument.name for argument in unit.inputs)
         yield from wrap(f"{unit.name} := proc({arguments})")
         outputs = [argument.name for argument in unit.outputs]
         yield from wrap(f"local {', '.join([*unit.locals, *outputs])};", "  ")
         yield from (f"  {load.replace(' = ', ' := ', 1)};" for load in self.loads(unit))
-        for title, lines in sections(unit):
-            if title:
-                yield f"\n  # {title}"
-            for line in lines:
-                yield from wrap(f"{line.name} := {value_text(line, printer, _CHOICE)};", "  ")
+        yield from section_lines(
+            unit,
+            "\n  # {}",
+            lambda line: wrap(f"{line.name} := {value_text(line, printer, _CHOICE)};", "  "),
+        )
         yield ""
         for out in unit.outputs:
             yield from _output(unit, out, printer)
@@ -84,6 +89,7 @@ class Maple(Language):
 
 
 def _output(unit: CodeUnit, out: Argument, printer: Any) -> Iterator[str]:
+    """Yield the lines that create an output."""
     grid = grid_texts(unit, out, printer, "0")
     if out.scalar:
         value = grid[0][0]

@@ -15,7 +15,7 @@ from mbs.export.languages.language import (
     grid_texts,
     kept_inside,
     plain_number,
-    sections,
+    section_lines,
     value_text,
     wrap,
 )
@@ -58,16 +58,21 @@ class Mathematica(Language):
     tail = "x"
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in Mathematica."""
         return printer_of(MCodePrinter, self.title, _number, _FORMS, "{0}^{1}")
 
     def legal(self, name: str) -> str:
-        """Return the name without _, which marks patterns: a_b becomes aB, A1_12 becomes A1x12."""
+        """Return a name without "_", which marks patterns: a_b becomes aB, A1_12 becomes A1x12."""
         parts = re.sub(r"(?<=\d)_(?=\d)", "x", super().legal(name)).split("_")
         return parts[0] + "".join(part[:1].upper() + part[1:] for part in parts[1:])
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the Mathematica text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         first, *others = kept_inside(unit.header, in_wolfram_comment)
         yield f"(* {first}"
         yield from (f"   {line}".rstrip() for line in others)
@@ -76,11 +81,11 @@ class Mathematica(Language):
         names = ", ".join(unit.locals)
         yield from wrap(f"{unit.name}[{arguments}] := Module[{{{names}}},")
         yield from (f"  {load};" for load in self.loads(unit))
-        for title, lines in sections(unit):
-            if title:
-                yield f"\n  (* {title} *)"
-            for line in lines:
-                yield from wrap(f"{line.name} = {value_text(line, printer, _CHOICE)};", "  ")
+        yield from section_lines(
+            unit,
+            "\n  (* {} *)",
+            lambda line: wrap(f"{line.name} = {value_text(line, printer, _CHOICE)};", "  "),
+        )
         yield ""
         outputs = [_output(unit, out, printer) for out in unit.outputs]
         result = outputs[0] if len(outputs) == 1 else f"{{{', '.join(outputs)}}}"
@@ -89,12 +94,14 @@ class Mathematica(Language):
 
 
 def _number(value: float) -> str:
+    """Return a constant with `*^` before its exponent."""
     text = plain_number(value)
     mantissa, _, exponent = text.partition("e")
     return f"{mantissa}*^{int(exponent)}" if exponent else text
 
 
 def _output(unit: CodeUnit, out: Argument, printer: Any) -> str:
+    """Return the expression of an output."""
     grid = grid_texts(unit, out, printer, "0")
     if out.scalar:
         return grid[0][0]

@@ -13,7 +13,7 @@ from mbs.export.languages.language import (
     branches,
     comment_lines,
     plain_number,
-    sections,
+    section_lines,
     wrap,
 )
 from mbs.export.languages.symbolic import printer_of
@@ -52,12 +52,17 @@ class Matlab(Language):
     longest_name = 63
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in Matlab."""
         signs = {"Unequality": "~="}
         return printer_of(OctaveCodePrinter, self.title, plain_number, _FORMS, "{0}^{1}", signs)
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the Matlab text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         inside = ", ".join(argument.name for argument in unit.inputs)
         outside = ", ".join(argument.name for argument in unit.outputs)
         outside = outside if len(unit.outputs) == 1 else f"[{outside}]"
@@ -65,15 +70,14 @@ class Matlab(Language):
         yield from comment_lines(unit.header, "%")
         yield ""
         yield from (f"  {load};" for load in self.loads(unit))
-        for title, lines in sections(unit):
-            if title:
-                yield f"\n  % {title}"
-            for line in lines:
-                yield from branches(line, printer, _BRANCHES, _statement, ";")
+        yield from section_lines(
+            unit, "\n  % {}", lambda line: branches(line, printer, _BRANCHES, _statement, ";")
+        )
         yield from self._stores(unit, printer)
         yield "end"
 
     def _stores(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
+        """Yield the assignments of all outputs."""
         for out in unit.outputs:
             yield ""
             if not out.scalar or unit.has_zeros(out):
@@ -82,4 +86,5 @@ class Matlab(Language):
 
 
 def _statement(text: str, indent: str = "  ") -> list[str]:
+    """Return a statement broken into lines with continuation marks."""
     return wrap(text, indent, _CONTINUED)

@@ -20,9 +20,14 @@ _FORMS = {
 
 
 def one_line(graph: Graph, names: Sequence[str]) -> str:
-    """Return the text of the single result of a graph.
+    """Return the single result of a graph as an expression in the grammar of mechanism files.
 
-    names: names of the elements of its single input.
+    Args:
+        graph: graph with a single input and a single result.
+        names: names of the elements of its input.
+
+    Raises:
+        ModelError: the grammar does not have an operation of the graph.
     """
     graph, _ = arrange(graph)
     inputs = {

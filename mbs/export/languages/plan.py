@@ -33,7 +33,13 @@ _NAME, _NUMBER, _SIGNS = 4, 8, 3
 
 
 class Choice(NamedTuple):
-    """Conditional value: `value` if the condition holds, else `otherwise` (None: zero). Nodes."""
+    """Conditional value of a node, given by node indices.
+
+    Attributes:
+        condition: condition.
+        value: value if the condition holds.
+        otherwise: value if it does not hold; None for zero.
+    """
 
     condition: int
     value: int
@@ -58,14 +64,14 @@ class LinePlan:
 
 
 def arrange(graph: Graph, first: Iterable[int] = ()) -> tuple[Graph, dict[int, int]]:
-    """Remove duplicate and unused nodes, and order nodes by their first use.
+    """Return a graph without duplicate and unused nodes, ordered by the first use of nodes.
 
     Args:
         graph: graph of scalar operations.
-        first: nodes to compute first, each after its operands. Results follow.
+        first: indices of nodes to compute first, each after its operands. Results follow.
 
     Returns:
-        New graph, and dict from old to new node index of the nodes in it.
+        New graph, and the new index by old index of the nodes in it.
     """
     roots = [*first, *(number for result in graph.results for number in result)]
     nodes: list[Node] = []
@@ -97,14 +103,14 @@ def arrange(graph: Graph, first: Iterable[int] = ()) -> tuple[Graph, dict[int, i
 
 
 def plan_of(graph: Graph, named: Iterable[int], parameters: Iterable[str] = ("p",)) -> LinePlan:
-    """Choose the nodes that become lines of code.
+    """Return the division of a graph into lines of code.
 
-    These are nodes with a name, nodes used more than once, conditional values, and parts of long
+    Lines are nodes with a name, nodes used more than once, conditional values, and parts of long
     expressions.
 
     Args:
         graph: graph from `arrange`. Results are lines, unless they are inputs or constants.
-        named: nodes that have a name.
+        named: indices of nodes that have a name.
         parameters: names of inputs that are constant between calls. Expressions of parameters only
             get separate lines.
     """
@@ -171,10 +177,11 @@ class _LinesSoFar:
             self.uses[number] = 1
         for number in reversed(range(len(self.graph.nodes))):
             if self.uses[number] or self.tests[number]:
-                self._settle(number)
+                self._add_line_if_needed(number)
                 self._pass_on(number)
 
-    def _settle(self, number: int) -> None:
+    def _add_line_if_needed(self, number: int) -> None:
+        """Make a node a line if it is used repeatedly, or is a condition or conditional value."""
         op = self.graph.nodes[number].op
         if op in LEAVES or not self.uses[number]:
             return
@@ -183,6 +190,7 @@ class _LinesSoFar:
             self.cuts.add(number)
 
     def _pass_on(self, number: int) -> None:
+        """Count the uses of the operands of a node."""
         node, times = self.graph.nodes[number], 1
         if node.op == casadi.OP_NEG and number not in self.cuts:
             times = self.uses[number]
@@ -203,11 +211,16 @@ class _LinesSoFar:
                 self.cuts.add(self._bare(operand))
 
     def _test(self, number: int, times: int) -> None:
+        """Count `times` uses of a node as a condition, or as a value if it is no condition."""
         tally = self.tests if self.graph.nodes[number].op in CONDITIONS else self.uses
         tally[number] += times
 
     def _stands_alone(self, number: int, operand: int) -> bool:
-        """Whether an operand must be a line: the operation needs a name, or it can be hoisted."""
+        """Whether an operand of a node must be a line.
+
+        This is so if the operation needs a name, or if the operand alone depends only on
+        parameters.
+        """
         bare = self._bare(operand)
         if self.graph.nodes[bare].op in LEAVES:
             return False
@@ -215,7 +228,7 @@ class _LinesSoFar:
         return hoisted or (self.graph.nodes[number].op not in _PLAIN and number not in self.choices)
 
     def _bare(self, number: int) -> int:
-        """Return the node without leading negations."""
+        """Return the node without leading negations that are not lines."""
         while self.graph.nodes[number].op == casadi.OP_NEG and number not in self.cuts:
             number = self.graph.nodes[number].args[0]
         return number
@@ -239,4 +252,5 @@ class _LinesSoFar:
             length[number] = _NAME if number in self.cuts else own
 
     def _operands(self, number: int) -> Sequence[int | None]:
+        """Return the operands of a node, or the parts of a conditional value."""
         return self.choices.get(number) or self.graph.operands(number)

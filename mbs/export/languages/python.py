@@ -13,7 +13,7 @@ from mbs.export.languages.language import (
     Language,
     kept_inside,
     plain_number,
-    sections,
+    section_lines,
     value_text,
     wrap,
 )
@@ -51,13 +51,18 @@ class Python(Language):
     first = 0
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in Python."""
         return printer_of(
             PythonCodePrinter, self.title, plain_number, _FORMS, "{0}**{1}", joins=_JOINS
         )
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the Python text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         body = list(self._body(unit, printer))
         if any("math." in line for line in body):
             yield "import math"
@@ -72,6 +77,7 @@ class Python(Language):
         yield from body
 
     def _body(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
+        """Yield the lines of the body of the function."""
         shapes = []
         for argument in unit.inputs:
             yield f"    {argument.name} = np.asarray({argument.name}, dtype=float)"
@@ -79,17 +85,18 @@ class Python(Language):
             shapes.append(f"{argument.name}.shape" + (f"[{axes}:]" if axes else ""))
         yield from _statement("shape", f"np.broadcast_shapes({', '.join(shapes)})")
         yield from (f"    {load}" for load in self.loads(unit))
-        for title, lines in sections(unit):
-            if title:
-                yield f"\n    # {title}"
-            for line in lines:
-                yield from _statement(line.name, value_text(line, printer, _CHOICE))
+        yield from section_lines(
+            unit,
+            "\n    # {}",
+            lambda line: _statement(line.name, value_text(line, printer, _CHOICE)),
+        )
         for out in unit.outputs:
             yield ""
             yield from self._output(unit, out, printer)
         yield f"    return {', '.join(argument.name for argument in unit.outputs)}"
 
     def _output(self, unit: CodeUnit, out: Any, printer: Any) -> Iterator[str]:
+        """Yield the lines that create an output."""
         if not out.scalar:
             sizes = f"{out.rows}" if out.is_vector else f"{out.rows}, {out.columns}"
             yield f"    {out.name} = np.zeros(({sizes}, *shape))"
@@ -99,6 +106,7 @@ class Python(Language):
 
 
 def _statement(name: str, value: str) -> list[str]:
+    """Return an assignment as lines, in parentheses if it is long."""
     lines = wrap(f"{name} = {value}", "    ")
     if len(lines) == 1:
         return lines

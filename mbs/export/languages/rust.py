@@ -8,11 +8,10 @@ from typing import Any
 from sympy.printing.rust import RustCodePrinter
 
 from mbs.export.languages.language import (
-    Argument,
     CodeUnit,
     Language,
     comment_lines,
-    sections,
+    section_lines,
     value_text,
     wrap,
 )
@@ -50,17 +49,19 @@ class Rust(Language):
     reserved = frozenset(_WORDS.split())
     scalars_by_name = False
     squares_as_products = True
+    by_columns = True
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in Rust."""
         return printer_of(RustCodePrinter, self.title, repr, _FORMS, "f64::powf({0}, {1})")
 
-    def place(self, argument: Argument, row: int, column: int) -> str:
-        """Return the text of an element of an input or output. row, column: 0-based."""
-        return f"{argument.name}[{row + argument.rows * column}]"
-
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the Rust text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         # Not `///`: cargo test compiles and runs examples in Rust documentation.
         yield from comment_lines(unit.header, "//")
         arguments = [f"{argument.name}: &[f64]" for argument in unit.inputs]
@@ -68,13 +69,13 @@ class Rust(Language):
         yield f"#[allow({_LINTS})]"
         yield from wrap(f"pub fn {unit.name}({', '.join(arguments)}) {{")
         yield from (f"    let {load};" for load in self.loads(unit))
-        for title, lines in sections(unit):
-            if title:
-                yield f"\n    // {title}"
-            for line in lines:
-                yield from wrap(
-                    f"let {line.name}: f64 = {value_text(line, printer, _CHOICE)};", "    "
-                )
+        yield from section_lines(
+            unit,
+            "\n    // {}",
+            lambda line: wrap(
+                f"let {line.name}: f64 = {value_text(line, printer, _CHOICE)};", "    "
+            ),
+        )
         for out in unit.outputs:
             yield ""
             if unit.has_zeros(out):

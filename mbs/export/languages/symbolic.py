@@ -84,7 +84,11 @@ class SympyWriter:
     squares_as_products: bool
 
     def line(self, number: int) -> CodeLine:
-        """Return the line that assigns a node."""
+        """Return the line of code that computes a node.
+
+        Args:
+            number: index of the node.
+        """
         name, node = self.names[number], self.plan.graph.nodes[number]
         choice = self.plan.choices.get(number)
         if choice:
@@ -95,13 +99,22 @@ class SympyWriter:
         return CodeLine(name, self._operation(node))
 
     def value(self, number: int) -> Expr:
-        """Return a node as an operand: the symbol of a named node, else the full expression."""
+        """Return a node as an operand: the symbol of a named node, else its full expression.
+
+        Args:
+            number: index of the node.
+        """
         if number in self.names:
             return symbol(self.names[number])
         return self._operation(self.plan.graph.nodes[number])
 
     def condition(self, number: int, denied: bool = False) -> Expr:
-        """Return a node as a condition, or the negation. A number is true if it is not zero."""
+        """Return a node as a condition; a number is true if it is not zero.
+
+        Args:
+            number: index of the node.
+            denied: whether to return the negation.
+        """
         node = self.plan.graph.nodes[number]
         if node.op == casadi.OP_NOT:
             return self.condition(node.args[0], not denied)
@@ -118,6 +131,7 @@ class SympyWriter:
         return _UNDEFINED["denied"](holds) if denied and op == node.op else holds
 
     def _operation(self, node: Node) -> Expr:
+        """Return a node as an operation on its operands; raise a ModelError if it has no text."""
         if node.op == casadi.OP_CONST:
             return number_of(node.value)
         values = [self.value(operand) for operand in node.args]
@@ -138,18 +152,22 @@ class SympyWriter:
         )
 
     def _square(self, value: Expr) -> Expr:
+        """Return the square of a value as a product or power, without its sign."""
         sign, factors = _factors(value)
         base = _product(1, factors) if sign < 0 else value
         return product(base, base) if self.squares_as_products else _pow(base, Integer(2))
 
 
 def symbol(name: str) -> Expr:
-    """Return the real sympy symbol of a name."""
+    """Return the real sympy symbol with a name."""
     return Symbol(name, real=True)
 
 
 def number_of(value: float) -> Expr:
     """Return a constant as a sympy number.
+
+    Args:
+        value: constant.
 
     Raises:
         ModelError: the value is infinite or NaN.
@@ -163,7 +181,11 @@ def number_of(value: float) -> Expr:
 
 
 def total(*values: Expr) -> Expr:
-    """Return the sum of values, with numbers added up and a positive term first if possible."""
+    """Return the sum of values, with numbers added up and a positive term first if possible.
+
+    Args:
+        *values: sympy expressions.
+    """
     every = [term for value in values for term in Add.make_args(value)]
     terms = _gather(every, math.fsum, 0.0)
     first = next((k for k, term in enumerate(terms) if _factors(term)[0] > 0), 0)
@@ -178,7 +200,10 @@ def product(a: Expr, b: Expr) -> Expr:
 
 
 def _gather(parts: list[Expr], join: Callable[[list[float]], float], neutral: float) -> list[Expr]:
-    """Combine the numbers among the parts of a sum or product into a single number, placed last."""
+    """Return the parts of a sum or product with its numbers combined into one, placed last.
+
+    `join` combines numbers, `neutral` is 0 for a sum and 1 for a product.
+    """
     numbers = [float(part) for part in parts if part.is_Float]
     others = [part for part in parts if not part.is_Float]
     if len(numbers) < 2:
@@ -212,6 +237,7 @@ def _factors(value: Expr) -> tuple[int, list[Expr]]:
 
 
 def _product(sign: int, factors: list[Expr]) -> Expr:
+    """Return the product of factors with a sign, numbers first."""
     factors = sorted(factors, key=lambda factor: not factor.is_Float)
     if sign < 0:
         head = factors[0]
@@ -220,16 +246,18 @@ def _product(sign: int, factors: list[Expr]) -> Expr:
 
 
 def _pow(base: Expr, exponent: Expr) -> Expr:
+    """Return base^exponent as a sympy power that is not evaluated."""
     return Pow(base, exponent, evaluate=False)
 
 
 def _join(join: str, conditions: list[Expr]) -> Expr:
-    """Join conditions by "both" or "either". Nested joins of the same kind are flattened."""
+    """Return conditions joined by "both" (and) or "either" (or); nested joins are flattened."""
     parts = (c.args if type(c).__name__ == join else (c,) for c in conditions)
     return _UNDEFINED[join](*(part for some in parts for part in some))
 
 
 def _inverse(value: Expr) -> Expr:
+    """Return 1 / value."""
     sign, factors = _factors(value)
     return _product(sign, [_flip(factor) for factor in factors])
 
@@ -241,7 +269,7 @@ def _flip(factor: Expr) -> Expr:
 
 
 def _power(base: Expr, exponent: Expr) -> Expr:
-    """Return a power. Small integer exponents (absolute value 2 to 64) become integers."""
+    """Return base^exponent; an integer exponent of magnitude 2 to 64 becomes a sympy integer."""
     whole = exponent.is_Float and float(exponent).is_integer()
     if whole and 2 <= abs(float(exponent)) <= _LARGEST_INTEGER_POWER:
         positive = _pow(base, Integer(abs(int(exponent))))
@@ -302,6 +330,10 @@ class Readable(CodePrinter):  # type: ignore[misc]
         return self._print(expr)
 
     def _print(self, expr: Any, **kwargs: Any) -> str:
+        """Return the text of an expression, with the formats of the language.
+
+        Raise a ModelError if the language does not have a function.
+        """
         name = type(expr).__name__
         if name in self.comparisons:
             return self._comparison(expr)
@@ -317,21 +349,27 @@ class Readable(CodePrinter):  # type: ignore[misc]
         return _call_text(form, [self._print(arg) for arg in expr.args])
 
     def _print_Symbol(self, expr: Any) -> str:
+        """Return the name of a symbol."""
         return str(expr.name)
 
     def _print_Float(self, expr: Any, **kwargs: Any) -> str:
+        """Return a number with all digits."""
         return type(self).number(float(expr))
 
     def _print_One(self, expr: Any) -> str:
+        """Return the number one."""
         return type(self).number(1.0)
 
     def _print_Add(self, expr: Any, order: Any = None) -> str:
+        """Return a sum in the given order."""
         return str(CodePrinter._print_Add(self, expr, order="none"))
 
     def _print_Mul(self, expr: Any) -> str:
+        """Return a product in the given order."""
         return str(CodePrinter._print_Mul(self, expr))
 
     def _print_Pow(self, expr: Any, **kwargs: Any) -> str:
+        """Return a power, a square root or a reciprocal."""
         base, exponent = expr.args
         if exponent is S.Half:  # sqrt. Not for the number 0.5: only sqrt of -infinity is NaN
             return _call_text(self.forms["sqrt"], [self._print(base)])
@@ -347,6 +385,7 @@ class Readable(CodePrinter):  # type: ignore[misc]
         )
 
     def _comparison(self, expr: Any) -> str:
+        """Return a comparison with the sign of the language."""
         level = precedence(expr)
         left, right = (self.parenthesize(side, level) for side in expr.args)
         return f"{left} {self.comparisons[type(expr).__name__]} {right}"

@@ -43,13 +43,18 @@ class Symoro(Language):
     reserved = frozenset(["E", "I", "N", "O", "Q", "S", "pi"])
 
     def printer(self) -> Any:
-        """Return a printer that writes sympy expressions in this language."""
+        """Return a printer that writes sympy expressions in SYMORO."""
         return printer_of(
             PythonCodePrinter, self.title, plain_number, _FORMS, "{0}**{1}", joins=_JOINS
         )
 
     def lines(self, unit: CodeUnit, printer: Any) -> Iterator[str]:
-        """Yield the lines of the text of a function."""
+        """Yield the lines of the SYMORO text of a function.
+
+        Args:
+            unit: function to write.
+            printer: printer of sympy expressions from `printer`.
+        """
         first, *others = kept_inside(unit.header, in_bracket_comment)
         yield f"(* {first}"
         yield from (f"   {line}".rstrip() for line in others)

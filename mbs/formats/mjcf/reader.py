@@ -109,7 +109,12 @@ class Flags:
 
     @staticmethod
     def of(mujoco: Any, model: Any) -> Flags:
-        """Return the flags of a compiled model."""
+        """Return the active parts of a compiled MuJoCo model from its option flags.
+
+        Args:
+            mujoco: the mujoco module.
+            model: the mujoco.MjModel.
+        """
         disabled = set(_flag_names(mujoco.mjtDisableBit, "mjDSBL_", int(model.opt.disableflags)))
         enabled = set(_flag_names(mujoco.mjtEnableBit, "mjENBL_", int(model.opt.enableflags)))
         unknown = (disabled - _EFFECTIVE - _WITHOUT_EFFECT) | (enabled - _ENABLED_WITHOUT_EFFECT)
@@ -129,13 +134,26 @@ class Flags:
             unknown=tuple(sorted(name.lower() for name in unknown)),
         )
 
-    def drives(self, group: int) -> bool:
-        """Whether actuators of a group act; groups without a bit are always active."""
+    def group_acts(self, group: int) -> bool:
+        """Whether the actuators of an actuator group act.
+
+        MuJoCo can disable groups 0 to 30; actuators of other groups always act, unless actuation as
+        a whole is disabled.
+
+        Args:
+            group: number of the group.
+        """
         return self.actuation and not (0 <= group < 31 and self.disabled_groups >> group & 1)
 
 
 def _flag_names(kinds: Any, prefix: str, bits: int) -> Iterator[str]:
-    """Yield the names of the set bits, or "bit N" for bits without a name."""
+    """Yield the name of each set bit of a flag word, or "bit N" for a bit without a name.
+
+    Args:
+        kinds: MuJoCo enumeration of the bits.
+        prefix: prefix of the names in the enumeration, which is removed.
+        bits: flag word.
+    """
     known = {int(kind): name for name, kind in kinds.__members__.items() if name.startswith(prefix)}
     for k in range(bits.bit_length()):
         if bits >> k & 1:
@@ -156,8 +174,8 @@ class MjcfModel:
         bodies, joints, sites, equalities, tendons: component names, by MuJoCo index.
         acting: indices of the active actuators.
         flags: active parts of the model.
-        locked: positions of joints that are locked by equalities [rad or m], and 0 for free joints
-            of fixed roots.
+        locked: position [rad or m] of each joint that equalities lock, by joint index; 0 for free
+            joints of roots that are fixed to the world.
     """
 
     mujoco: Any
@@ -174,12 +192,21 @@ class MjcfModel:
 
     @staticmethod
     def of(mujoco: Any, model: Any, notes: Notes) -> MjcfModel:
-        """Return the model with valid component names, each used once."""
+        """Return a compiled model with a valid component name for each element, used only once.
+
+        Args:
+            mujoco: the mujoco module.
+            model: the mujoco.MjModel.
+            notes: notes of the file, which receive a note for each changed name.
+
+        Raises:
+            DescriptionError: an equality cannot be satisfied.
+        """
         taken = {"base", "world"}
         plain = _names((model.body(k).name for k in range(model.nbody)), "body")
 
         def distinct(kind: str, given: Sequence[str], wanted: Sequence[str]) -> tuple[str, ...]:
-            found = tuple(_apart(name, taken, kind) for name in wanted)
+            found = tuple(_unique_name(name, taken, kind) for name in wanted)
             for old, new in zip(given, found, strict=True):
                 if old and old != new:
                     notes.add("renamed", f"{kind} {quoted(old)}", f"its name here is {new!r}")
@@ -208,7 +235,9 @@ class MjcfModel:
             of_kind("equality", model.neq, model.eq),
             of_kind("tendon", model.ntendon, model.tendon),
             tuple(
-                k for k in range(_actuators_in(model)) if flags.drives(int(model.actuator_group[k]))
+                k
+                for k in range(_actuators_in(model))
+                if flags.group_acts(int(model.actuator_group[k]))
             ),
             flags,
             {},
@@ -221,20 +250,40 @@ class MjcfModel:
         return self.notes.path
 
     def refuse(self, what: str, remedy: str = "take it out of the file") -> NoReturn:
-        """Raise an error about the file."""
+        """Raise a DescriptionError with the path of the file.
+
+        Args:
+            what: fault of the file.
+            remedy: what the user can do.
+        """
         raise DescriptionError(f"{self.path}: {what}; {remedy}")
 
     def has_one_axis(self, j: int) -> bool:
-        """Whether joint j is a hinge or slide."""
+        """Whether a joint is a hinge or slide, and so has one degree of freedom.
+
+        Args:
+            j: MuJoCo index of the joint.
+        """
         kinds = self.mujoco.mjtJoint
         return int(self.data.jnt_type[j]) in (int(kinds.mjJNT_HINGE), int(kinds.mjJNT_SLIDE))
 
     def drawn(self, j: int) -> float:
-        """Return the position of a hinge or slide in the initial configuration qpos0 [rad or m]."""
+        """Return the position of a hinge or slide in the initial configuration qpos0 [rad or m].
+
+        Args:
+            j: MuJoCo index of the joint.
+        """
         return float(self.data.qpos0[self.data.jnt_qposadr[j]])
 
     def terms(self, k: int) -> dict[int, float] | None:
-        """Return the coefficients of the joints in a fixed tendon length; None if it is spatial."""
+        """Return the coefficients of a fixed tendon: length = sum of coefficient times q.
+
+        Args:
+            k: index of the tendon.
+
+        Returns:
+            Coefficient by joint index; None if the tendon is spatial.
+        """
         found: dict[int, float] = {}
         first = int(self.data.tendon_adr[k])
         for w in range(first, first + int(self.data.tendon_num[k])):
@@ -245,7 +294,11 @@ class MjcfModel:
         return found
 
     def path_bodies(self, k: int) -> list[int]:
-        """Return the bodies on the path of a spatial tendon."""
+        """Return the MuJoCo indices of the bodies along the path of a spatial tendon.
+
+        Args:
+            k: MuJoCo index of the tendon.
+        """
         kinds = self.mujoco.mjtWrap
         first = int(self.data.tendon_adr[k])
         found = []
@@ -258,7 +311,11 @@ class MjcfModel:
         return found
 
     def joints_above(self, k: int) -> set[int]:
-        """Return the joints that move body k, without locked joints."""
+        """Return the indices of the joints between the world and a body, without locked joints.
+
+        Args:
+            k: MuJoCo index of the body.
+        """
         found: set[int] = set()
         while k:
             first = int(self.data.body_jntadr[k])
@@ -268,7 +325,13 @@ class MjcfModel:
 
 
 def placed(point: Point, pos: Sequence[float], quat: Sequence[float]) -> Point:
-    """Return the frame at a position [m] and quaternion (w, x, y, z) relative to a frame."""
+    """Return the frame at a position and quaternion relative to the frame `point`.
+
+    Args:
+        point: reference frame.
+        pos: position (x, y, z) of the origin in the reference frame [m].
+        quat: quaternion (w, x, y, z), not necessarily of unit length.
+    """
     R = matrix_of_quaternion(quat)
     # larger than rounding errors of a normalised (1, 0, 0, 0), smaller than any rotation in files
     turned = None if np.allclose(R, np.eye(3), rtol=0, atol=1e-15) else R.tolist()
@@ -277,17 +340,25 @@ def placed(point: Point, pos: Sequence[float], quat: Sequence[float]) -> Point:
 
 
 def _names(names: Iterable[str], kind: str) -> tuple[str, ...]:
+    """Return valid component names; unnamed elements are called `kind` and index, as in "site3"."""
     return tuple(component_name(name) or f"{kind}{k}" for k, name in enumerate(names))
 
 
 def _joint_name(model: Any, j: int, bodies: tuple[str, ...]) -> str:
+    """Return a name for joint j without a name: the name of its body with a suffix.
+
+    `bodies` are the component names of the bodies, by index.
+    """
     k = int(model.jnt_bodyid[j])
     alone = model.body_jntnum[k] == 1
     return f"{bodies[k]}_joint" if alone else f"{bodies[k]}_joint{j - model.body_jntadr[k] + 1}"
 
 
-def _apart(name: str, taken: set[str], kind: str) -> str:
-    """Return the name, made unique by a suffix, and add it to `taken`."""
+def _unique_name(name: str, taken: set[str], kind: str) -> str:
+    """Return a unique component name and add it to `taken`.
+
+    If the name is taken, the kind of the element and then a number are appended.
+    """
     if name in taken:
         name = f"{name}_{kind}"
     found = numbered_name(name, taken)
@@ -307,17 +378,28 @@ def _actuators_in(model: Any) -> int:
 
 
 def _first_of(model: Any, address: str, k: int) -> int:
-    """Return the row of the first control ("ctrladr") or output ("outadr") of actuator k."""
+    """Return the index of the first control or output of actuator k.
+
+    `address` is "ctrladr" for controls and "outadr" for outputs. It is k before MuJoCo 4.
+    """
     rows = getattr(model, f"actuator_{address}", None)  # MuJoCo before version 4 has one row each
     return k if rows is None else int(rows[k])
 
 
-def drives(mjcf: MjcfModel) -> dict[int, dict[int, float | None]]:
+def joint_actuators(mjcf: MjcfModel) -> dict[int, dict[int, float | None]]:
     """Return for each joint its actuators, with the joint effort per unit of actuator force.
 
     A fixed tendon drives its joints with its coefficients. A spatial tendon and the rod of a
     slider-crank drive all joints between the bodies on their path, with factors that depend on the
-    configuration and are None here. Forces on sites and bodies drive no joint.
+    configuration and are None here. Forces on sites and bodies drive no joint. Import notes report
+    properties of actuators that are not read.
+
+    Args:
+        mjcf: compiled model.
+
+    Returns:
+        For each index of a driven joint: joint effort per unit of actuator force, by actuator
+            index.
     """
     model, kinds = mjcf.data, mjcf.mujoco.mjtTrn
     found: dict[int, dict[int, float | None]] = {}
@@ -347,14 +429,17 @@ def drives(mjcf: MjcfModel) -> dict[int, dict[int, float | None]]:
 
 
 def _between_bodies(mjcf: MjcfModel, bodies: Sequence[int]) -> set[int]:
-    """Return the joints that move some but not all of the bodies."""
+    """Return the joints that move some but not all of the bodies with these indices."""
     above = [mjcf.joints_above(k) for k in bodies]
     some: set[int] = set()
     return some.union(*above) - above[0].intersection(*above) if above else some
 
 
 def _note_actuator(mjcf: MjcfModel, k: int, joints: Sequence[int]) -> None:
-    """Add notes about the properties of an actuator that the mechanism does not include."""
+    """Add import notes about properties of actuator k that the mechanism does not include.
+
+    `joints` are the indices of the joints that it drives.
+    """
     model, kinds = mjcf.data, mjcf.mujoco.mjtTrn
     element = f"actuator {quoted(model.actuator(k).name or k)}"
     kind = int(model.actuator_trntype[k])
@@ -387,12 +472,13 @@ def effort_range(
 
     It is the sum of the forcerange of the actuators times their gear, limited to the
     actuatorfrcrange of the joint. A motor without dynamics and feedback is also limited by its
-    ctrlrange, unless the flag clampctrl is disabled.
+    ctrlrange, unless the flag clampctrl is disabled. A range that does not contain zero is treated
+    as unlimited.
 
     Args:
         mjcf: compiled model.
         j: index of a hinge or slide.
-        acting: joint effort per unit of actuator force, by actuator; see `drives`.
+        acting: joint effort per unit of actuator force, by actuator index; see `joint_actuators`.
     """
     model = mjcf.data
     lower, upper = (0.0, 0.0) if acting else (-math.inf, math.inf)
@@ -410,7 +496,7 @@ def effort_range(
 
 
 def _is_plain(mjcf: MjcfModel, k: int) -> bool:
-    """Whether actuator k is a motor: its force is proportional to its control."""
+    """Whether actuator k is a plain motor: its force is a constant times its control."""
     model, kinds = mjcf.data, mjcf.mujoco
     return (
         int(model.actuator_gaintype[k]) == int(kinds.mjtGain.mjGAIN_FIXED)
@@ -420,7 +506,7 @@ def _is_plain(mjcf: MjcfModel, k: int) -> bool:
 
 
 def _force(mjcf: MjcfModel, k: int) -> _Range:
-    """Return the range of the force of actuator k, without its gear."""
+    """Return the range (lower, upper) of the force of actuator k, before its gear."""
     model = mjcf.data
     low, high = -math.inf, math.inf
     if model.actuator_forcelimited[k]:
@@ -437,25 +523,29 @@ def _force(mjcf: MjcfModel, k: int) -> _Range:
 
 
 class Joints:
-    """Builder that adds the joints of a model to a mechanism.
+    """Builder that adds the joints of a MuJoCo model to a mechanism.
 
     Attributes:
         mechanism: mechanism under construction.
         mjcf: compiled model.
         base: "fixed" fixes free roots to the world, "free" adds free joints to roots without
-            joints.
-        acting: actuators of each joint; see `drives`.
+            joints; None keeps the joints of the file.
+        acting: actuators of each joint; see `joint_actuators`.
     """
 
     def __init__(self, mechanism: Mechanism, mjcf: MjcfModel, base: Base | None) -> None:
         self.mechanism, self.mjcf, self.base = mechanism, mjcf, base
-        self.acting = drives(mjcf)
+        self.acting = joint_actuators(mjcf)
 
     def connect(self, k: int, parent: Point) -> None:
         """Connect body k, which is already in the mechanism, to its parent by its joints.
 
         A body without joints is fixed to its parent. Several joints are connected in series from
         the parent to the body, with a massless body between two joints.
+
+        Args:
+            k: MuJoCo index of the body.
+            parent: frame of the parent body.
         """
         mjcf, mechanism = self.mjcf, self.mechanism
         model = mjcf.data
@@ -484,7 +574,11 @@ class Joints:
             point = moved.frame
 
     def _connect(self, j: int, parent: Point, point: Point, moved: RigidBody) -> None:
-        """Connect joint j between `point`, the frame of the body at qpos0, and the moved body."""
+        """Connect joint j between the frame `point` of the body at qpos0 and the body `moved`.
+
+        A free joint starts at the frame `parent` of the parent body; a locked joint becomes a rigid
+        connection.
+        """
         mjcf, mechanism = self.mjcf, self.mechanism
         if mjcf.mujoco.mjtJoint(int(mjcf.data.jnt_type[j])) == mjcf.mujoco.mjtJoint.mjJNT_FREE:
             if self.base == "fixed":
@@ -503,6 +597,7 @@ class Joints:
             mechanism.connect(at, self._joint(j), anchor)
 
     def _joint(self, j: int) -> Joint:
+        """Return joint j as a component, with the friction, spring and limits that are active."""
         mjcf = self.mjcf
         model, kinds, flags = mjcf.data, mjcf.mujoco.mjtJoint, mjcf.flags
         kind, dof = kinds(int(model.jnt_type[j])), int(model.jnt_dofadr[j])
@@ -537,12 +632,19 @@ class Joints:
 
 
 def unused_name(mechanism: Mechanism, mjcf: MjcfModel, name: str) -> str:
-    """Return the name, with a number if it is used in the mechanism or the file."""
+    """Return the name, with a number appended if the mechanism or the file already uses it.
+
+    Args:
+        mechanism: mechanism under construction.
+        mjcf: compiled model.
+        name: desired component name.
+    """
     known = {*mjcf.bodies, *mjcf.joints, *mjcf.sites, *mjcf.equalities, *mjcf.tendons}
     return numbered_name(name, known, mechanism.components)
 
 
 def _free_joints(mjcf: MjcfModel) -> list[int]:
+    """Return the indices of the free joints of the model."""
     free = int(mjcf.mujoco.mjtJoint.mjJNT_FREE)
     return [j for j in range(mjcf.data.njnt) if int(mjcf.data.jnt_type[j]) == free]
 
@@ -553,7 +655,7 @@ def _is_root(mjcf: MjcfModel, k: int) -> bool:
 
 
 def _displace(mjcf: MjcfModel, j: int, point: Point, position: float) -> Point:
-    """Displace a frame along or about the axis of a hinge or slide [rad or m]."""
+    """Return `point` displaced along slide j by `position` [m], or rotated about hinge j [rad]."""
     if position == 0:
         return point
     axis = np.array(mjcf.data.jnt_axis[j], dtype=float)
@@ -570,7 +672,7 @@ def _displace(mjcf: MjcfModel, j: int, point: Point, position: float) -> Point:
 
 
 def _equalities(mjcf: MjcfModel) -> Iterator[tuple[int, Any]]:
-    """Yield index and kind of the active equalities."""
+    """Yield the index and the MuJoCo kind of each active equality constraint."""
     kinds = mjcf.mujoco.mjtEq
     for k in range(mjcf.data.neq if mjcf.flags.equalities else 0):
         if mjcf.data.eq_active0[k]:
@@ -578,7 +680,11 @@ def _equalities(mjcf: MjcfModel) -> Iterator[tuple[int, Any]]:
 
 
 def _locked(mjcf: MjcfModel) -> dict[int, float]:
-    """Return the positions of joints that equalities lock, directly or by couplings [rad or m]."""
+    """Return the positions [rad or m] of joints that equalities lock, by joint index.
+
+    A joint is locked directly by an equality with a constant, or by a coupling to a locked joint.
+    Raise a DescriptionError if a coupling has no solution.
+    """
     kinds = mjcf.mujoco.mjtEq
     found: dict[int, float] = {}
     linear = [_linear(mjcf, k, kind) for k, kind in _equalities(mjcf)]
@@ -623,14 +729,22 @@ _REAL = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class _Row:
-    """Linear equation of hinge and slide positions: sum of factors times positions = value."""
+    """Linear equation of joint positions q: the sum of factors times q equals a value.
+
+    Attributes:
+        terms: factor by joint index.
+        value: right-hand side [rad or m].
+    """
 
     terms: dict[int, float]
     value: float
 
 
 def _linear(mjcf: MjcfModel, k: int, kind: Any) -> _Row | None:
-    """Return an equality as a linear equation; None if it is not linear or couples two joints."""
+    """Return equality k as a linear equation of joint positions.
+
+    None if it is not linear, or if it is a coupling of two joints. `kind` is its MuJoCo kind.
+    """
     model, kinds = mjcf.data, mjcf.mujoco.mjtEq
     one, two = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
     constant, slope, *higher = (float(value) for value in model.eq_data[k, :5])
@@ -656,8 +770,8 @@ def add_closures(
     Args:
         mechanism: mechanism with all bodies and joints of the model.
         mjcf: compiled model.
-        bodies: frames of the bodies, starting with the world.
-        sites: frames of the sites.
+        bodies: frames of the bodies by MuJoCo index; the first is the world.
+        sites: frames of the sites by MuJoCo index.
 
     Returns:
         Indices of the equalities that were added.
@@ -694,7 +808,10 @@ def add_closures(
 
 
 def _rod(mjcf: MjcfModel, k: int, sites: Sequence[Point]) -> tuple[Point, Rod, Point]:
-    """Return a rod and its end frames, for an equality of a spatial tendon between two sites."""
+    """Return a rod and its two end frames, for equality k of a spatial tendon between two sites.
+
+    `sites` are the frames of the sites. Raise a DescriptionError for another tendon.
+    """
     model, name = mjcf.data, mjcf.equalities[k]
     tendon = int(model.eq_obj1id[k])
     ends = _two_sites(mjcf, tendon) if mjcf.terms(tendon) is None else None
@@ -716,7 +833,11 @@ def _close(
     bodies: Sequence[Point],
     sites: Sequence[Point],
 ) -> bool:
-    """Close a loop by a connect or weld; return False if there is no loop to close."""
+    """Close a loop by the connect or weld equality k, and cut the loop there.
+
+    Return False, with an import note, if the equality closes no loop. `bodies` and `sites` are
+    frames by index.
+    """
     model, mujoco = mjcf.data, mjcf.mujoco
     one, two = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
     values = [float(value) for value in model.eq_data[k]]
@@ -752,32 +873,36 @@ def _close(
 
 
 def _is_moved(mjcf: MjcfModel, k: int) -> bool:
-    """Whether body k or an ancestor is a mocap body."""
+    """Whether the motion of body k is prescribed from outside (its root is a mocap body)."""
     return int(mjcf.data.body_mocapid[mjcf.data.body_rootid[k]]) >= 0 and k > 0
 
 
 def _joints_of(mjcf: MjcfModel, k: int) -> tuple[int, int]:
-    """Return the driven and the driving joint of a joint equality."""
+    """Return the indices of the driven and the driving joint of joint equality k."""
     return int(mjcf.data.eq_obj1id[k]), int(mjcf.data.eq_obj2id[k])
 
 
 def _polynomial(mjcf: MjcfModel, k: int) -> Polynomial:
-    """Return the position of the driven joint as a polynomial of the driving joint [rad or m].
+    """Return the position of the driven joint as a polynomial of the driving position.
 
-    It is y - y0 = sum of a_k (x - x0)^k, where x0 and y0 are the positions at qpos0.
+    It is y - y0 = sum of a_k (x - x0)^k, where x0 and y0 are the positions at qpos0 [rad or m].
     """
     y0, x0 = (mjcf.drawn(j) for j in _joints_of(mjcf, k))
     return Polynomial(mjcf.data.eq_data[k, :5])(Polynomial([-x0, 1.0])) + y0
 
 
 def _coupling(mjcf: MjcfModel, k: int) -> Coupling:
+    """Return the joint equality k as a polynomial coupling of two joints."""
     driven, driver = (mjcf.joints[j] for j in _joints_of(mjcf, k))
     coefficients = tuple(float(c) for c in _polynomial(mjcf, k).trim().coef)
     return Coupling(mjcf.equalities[k], driven, driver, coefficients)
 
 
 def _linear_coupling(mjcf: MjcfModel, k: int, row: _Row) -> Coupling:
-    """Return a coupling in which the joint with the largest factor follows the other joints."""
+    """Return linear equality k as a coupling whose driven joint has the largest factor.
+
+    `row` is the equation. Locked joints enter with their constant positions.
+    """
     value = row.value - sum(c * mjcf.locked[j] for j, c in row.terms.items() if j in mjcf.locked)
     moving = {j: c for j, c in row.terms.items() if j not in mjcf.locked}
     driven = max(moving, key=lambda j: abs(moving[j]))
@@ -804,11 +929,12 @@ def add_forces(
     Args:
         mechanism: mechanism with all bodies and joints of the model.
         mjcf: compiled model.
-        bodies: frames of the bodies, starting with the world.
-        sites: frames of the sites.
+        bodies: frames of the bodies by MuJoCo index; the first is the world.
+        sites: frames of the sites by MuJoCo index.
 
     Raises:
-        DescriptionError: a spatial tendon with forces is not a straight line between two sites.
+        DescriptionError: a spatial tendon with forces is not a straight line between two sites, or
+            only some actuators of a body compensate gravity.
     """
     for k, name in enumerate(mjcf.tendons):
         _add_tendon(mechanism, mjcf, k, name, sites)
@@ -820,6 +946,11 @@ def add_forces(
 def _add_tendon(
     mechanism: Mechanism, mjcf: MjcfModel, k: int, name: str, sites: Sequence[Point]
 ) -> None:
+    """Add tendon k, named `name`, as a spring or fixed tendon, if it exerts a force.
+
+    `sites` are the frames of the sites. Raise a DescriptionError for a spatial tendon that exerts
+    forces and is not a linear spring between two sites.
+    """
     model, flags = mjcf.data, mjcf.flags
     if model.tendon_limited[k] and flags.limits:
         mjcf.notes.add(
@@ -860,7 +991,7 @@ def _add_tendon(
 
 
 def _two_sites(mjcf: MjcfModel, k: int) -> tuple[int, int] | None:
-    """Return the two sites of a straight spatial tendon; None for other tendons."""
+    """Return the indices of the end sites of straight spatial tendon k; None for other tendons."""
     model, site = mjcf.data, int(mjcf.mujoco.mjtWrap.mjWRAP_SITE)
     first, count = int(model.tendon_adr[k]), int(model.tendon_num[k])
     kinds = [int(model.wrap_type[w]) for w in range(first, first + count)]
@@ -870,7 +1001,11 @@ def _two_sites(mjcf: MjcfModel, k: int) -> tuple[int, int] | None:
 
 
 def _add_compensation(mechanism: Mechanism, mjcf: MjcfModel, k: int, body: Point) -> None:
-    """Add a force that compensates the weight of a body, at its centre of mass."""
+    """Add the force that compensates the weight of body k (gravcomp) at its centre of mass.
+
+    `body` is the frame of the body. Nothing is added if the body cannot move or has no weight.
+    Raise a DescriptionError if only some of its joints compensate gravity by their actuators.
+    """
     model = mjcf.data
     share, joints = float(model.body_gravcomp[k]), mjcf.joints_above(k)
     gravity = [float(value) for value in model.opt.gravity]
@@ -905,7 +1040,8 @@ def starting_configuration(mechanism: Mechanism, mjcf: MjcfModel, closures: Sequ
     """Set the initial guess of the mechanism to a configuration of the file.
 
     It is the first configuration that closes the loops, in the order: keyframe `home`, first
-    keyframe, qpos0. If there is none, it is the configuration with the smallest loop error.
+    keyframe, qpos0. If none of them closes the loops, it is the configuration with the smallest
+    loop error.
 
     Args:
         mechanism: mechanism with all joints of the model; its guess is set.
@@ -927,7 +1063,10 @@ def starting_configuration(mechanism: Mechanism, mjcf: MjcfModel, closures: Sequ
 
 
 def _opening(mjcf: MjcfModel, qpos: Any, closures: Sequence[int]) -> float:
-    """Return the largest error of the equalities at a configuration [m or rad]."""
+    """Return the largest residual of the equalities `closures` at a configuration [m or rad].
+
+    Infinite if `qpos`, the MuJoCo position vector, is not finite.
+    """
     if not closures or not np.all(np.isfinite(qpos)):
         return 0.0 if np.all(np.isfinite(qpos)) else math.inf
     mujoco, model = mjcf.mujoco, mjcf.data
@@ -948,7 +1087,10 @@ _QUATERNION = ("qw", "qx", "qy", "qz")
 
 
 def _positions(mjcf: MjcfModel, j: int, qpos: Any, all_of_them: bool) -> dict[str, float]:
-    """Return the positions of joint j by coordinate name; empty if zero, unless `all_of_them`."""
+    """Return the positions of joint j in the MuJoCo vector `qpos`, by coordinate name.
+
+    Empty if all are zero, unless `all_of_them` is True.
+    """
     kinds = mjcf.mujoco.mjtJoint
     kind, at = kinds(int(mjcf.data.jnt_type[j])), int(mjcf.data.jnt_qposadr[j])
     name = mjcf.joints[j]
@@ -980,12 +1122,12 @@ counts."""
 
 @dataclass(frozen=True, slots=True)
 class MeshAssets:
-    """Mesh files and the scale factors of their lengths.
+    """Mesh files of a model and the scale factors of their lengths along x, y and z.
 
     Attributes:
-        of_meshes: file and scale, by mesh name.
-        of_geoms: file and scale, by name of geoms that were replaced by spheres.
-        others: names of meshes that are not identical to a file.
+        of_meshes: file and scale factors, by mesh name.
+        of_geoms: file and scale factors, by name of the geoms that were replaced by spheres.
+        others: names of meshes that are not drawn, since they differ from a file.
     """
 
     of_meshes: dict[str, tuple[str, tuple[float, ...]]]
@@ -994,7 +1136,7 @@ class MeshAssets:
 
 
 def _mesh_assets(spec: Any) -> MeshAssets:
-    """Return the meshes that are used as in their files."""
+    """Return the meshes of a model specification that are used unchanged from their files."""
     found, others = {}, []
     for mesh in spec.meshes:
         moved = any(mesh.refpos) or tuple(mesh.refquat) != (1.0, 0.0, 0.0, 0.0)
@@ -1015,12 +1157,12 @@ def add_shapes(
     assets: MeshAssets,
     meshes: MeshFiles,
 ) -> None:
-    """Add the geoms of the bodies as shapes.
+    """Add the geoms of the bodies as shapes of the mechanism, for pictures.
 
     Args:
         mechanism: mechanism that receives the shapes.
         mjcf: compiled model.
-        points: frames of the bodies.
+        points: frames of the bodies by MuJoCo index.
         assets: mesh files and scale factors.
         meshes: search for the mesh files.
     """
@@ -1042,6 +1184,7 @@ def add_shapes(
 
 
 def _geom_colour(mjcf: MjcfModel, g: int) -> tuple[float, ...]:
+    """Return the colour (red, green, blue, opacity) of geom g, each between 0 and 1."""
     model = mjcf.data
     colour, material = tuple(map(float, model.geom_rgba[g])), int(model.geom_matid[g])
     if np.allclose(colour, _DEFAULT_COLOUR) and material >= 0:  # MuJoCo stores single precision
@@ -1056,6 +1199,10 @@ def _geom_shape(
     assets: MeshAssets,
     meshes: MeshFiles,
 ) -> Shape | None:
+    """Return geom g as a shape of the given colour; None if it cannot be drawn.
+
+    `assets` gives the file of a mesh, which `meshes` searches.
+    """
     model, kinds = mjcf.data, mjcf.mujoco.mjtGeom
     asset = assets.of_geoms.get(model.geom(g).name)
     kind = int(model.geom_type[g])
@@ -1080,7 +1227,10 @@ def _geom_shape(
 
 
 def _file_frame(mjcf: MjcfModel, g: int, point: Point) -> Point:
-    """Return the frame of a mesh file; MuJoCo moves meshes to their centre of mass."""
+    """Return the frame in which a mesh file of geom g is drawn; other geoms keep the frame `point`.
+
+    MuJoCo moves the points of a mesh to its centre of mass and principal axes.
+    """
     model = mjcf.data
     if int(model.geom_type[g]) != int(mjcf.mujoco.mjtGeom.mjGEOM_MESH):
         return point
@@ -1097,15 +1247,19 @@ def check_supported(mjcf: MjcfModel) -> None:
 
     Elements that are disabled by flags of the file are allowed.
 
+    Args:
+        mjcf: compiled model.
+
     Raises:
         DescriptionError: an unsupported element was found; the message names it.
     """
-    for checks in (_model, _joints, _tendons, _actuators):
+    for checks in (_model_faults, _joint_faults, _tendon_faults, _actuator_faults):
         for complaint in checks(mjcf):
             mjcf.refuse(complaint)
 
 
-def _model(mjcf: MjcfModel) -> Iterator[str]:
+def _model_faults(mjcf: MjcfModel) -> Iterator[str]:
+    """Yield an error message for each unsupported property of the model as a whole."""
     model = mjcf.data
     for name in mjcf.flags.unknown:
         yield f"its flag {name!r} is set, which this reader does not know"
@@ -1117,37 +1271,43 @@ def _model(mjcf: MjcfModel) -> Iterator[str]:
         yield "it has plugins, which mbs does not model"
 
 
-def _joints(mjcf: MjcfModel) -> Iterator[str]:
+def _joint_faults(mjcf: MjcfModel) -> Iterator[str]:
+    """Yield an error message for each unsupported property of a joint."""
     model = mjcf.data
     springs, dampers = mjcf.flags.springs, mjcf.flags.dampers
     for j, name in enumerate(mjcf.joints):
         if springs and model.jnt_stiffness[j] and not mjcf.has_one_axis(j):
             yield f"ball or free joint {name!r} has a spring (stiffness), which mbs does not model"
-        if springs and _any(model, "jnt_stiffnesspoly", j):
+        if springs and _is_nonzero(model, "jnt_stiffnesspoly", j):
             yield f"joint {name!r} has a spring that is not linear, which mbs does not model"
-        if dampers and _any(model, "dof_dampingpoly", int(model.jnt_dofadr[j])):
+        if dampers and _is_nonzero(model, "dof_dampingpoly", int(model.jnt_dofadr[j])):
             yield f"joint {name!r} has damping that is not linear, which mbs does not model"
 
 
-def _tendons(mjcf: MjcfModel) -> Iterator[str]:
+def _tendon_faults(mjcf: MjcfModel) -> Iterator[str]:
+    """Yield an error message for each unsupported property of a tendon."""
     model, flags = mjcf.data, mjcf.flags
     acting = {"stiffnesspoly": flags.springs, "dampingpoly": flags.dampers, "armature": True}
     for k, name in enumerate(mjcf.tendons):
         for what, acts in acting.items():
-            if acts and _any(model, f"tendon_{what}", k):
+            if acts and _is_nonzero(model, f"tendon_{what}", k):
                 yield f"tendon {name!r} has {what}, which mbs does not model"
 
 
-def _actuators(mjcf: MjcfModel) -> Iterator[str]:
+def _actuator_faults(mjcf: MjcfModel) -> Iterator[str]:
+    """Yield an error message for each unsupported property of an actuator."""
     model = mjcf.data
     for k in mjcf.acting:
         for what in ("armature", "damping", "dampingpoly"):
-            if _any(model, f"actuator_{what}", k):
+            if _is_nonzero(model, f"actuator_{what}", k):
                 yield f"actuator {model.actuator(k).name!r} has {what}; give it to the joint"
 
 
-def _any(model: Any, field: str, k: int) -> bool:
-    """Whether a field is nonzero at k; older versions of MuJoCo may not have the field."""
+def _is_nonzero(model: Any, field: str, k: int) -> bool:
+    """Whether the array `field` of a model is nonzero at index k.
+
+    False if this version of MuJoCo does not have the field.
+    """
     values = getattr(model, field, None)
     return values is not None and bool(np.any(values[k]))
 
@@ -1247,6 +1407,10 @@ def read_mjcf(
 
 
 def _model_name(path: str | Path) -> str:
+    """Return a component name for the model in a file: its attribute `model`, or the file name.
+
+    Raise a DescriptionError if the file is not MJCF or generates too many copies of an element.
+    """
     root = parse_xml(path)
     if root.tag != "mujoco":
         raise DescriptionError(
@@ -1263,7 +1427,10 @@ generate any number, for hours."""
 
 
 def _refuse_many_copies(path: str | Path, element: Element, copies: int) -> None:
-    """Raise if nested counts multiply an element to more than `_MOST_COPIES` copies."""
+    """Raise a DescriptionError if nested counts multiply an element to more than `_MOST_COPIES`.
+
+    `copies` is the number of copies that the enclosing elements generate.
+    """
     if element.tag in ("replicate", "composite", "flexcomp"):
         counts = [int(count) for count in re.findall(r"\d{1,18}", element.get("count", ""))]
         copies *= math.prod(counts)
@@ -1277,6 +1444,7 @@ def _refuse_many_copies(path: str | Path, element: Element, copies: int) -> None
 
 
 def _mujoco() -> Any:
+    """Return the module mujoco; raise a DescriptionError if it is not installed."""
     try:
         import mujoco
     except ImportError:
@@ -1288,7 +1456,11 @@ def _mujoco() -> Any:
 
 
 def _compile(mujoco: Any, path: str, notes: Notes) -> tuple[Any, MeshAssets]:
-    """Compile the model, if possible after removal of elements that do not affect the motion."""
+    """Compile a model file, and return the mujoco.MjModel and its mesh files.
+
+    Elements without effect on the motion are removed first; if this fails, the complete model is
+    compiled. Raise a DescriptionError with the message of MuJoCo if both fail.
+    """
     reasons: list[str] = []
     for stripped in (True, False):
         with warnings.catch_warnings(record=True) as heard:
@@ -1297,7 +1469,7 @@ def _compile(mujoco: Any, path: str, notes: Notes) -> tuple[Any, MeshAssets]:
                 spec = _spec(mujoco, path)
                 assets = _mesh_assets(spec)
                 if stripped:
-                    _strip(mujoco, spec, assets)
+                    _remove_unneeded(mujoco, spec, assets)
                 model = spec.compile()
             except (ValueError, RuntimeError) as error:
                 reasons.append(_sentence(error))
@@ -1309,28 +1481,30 @@ def _compile(mujoco: Any, path: str, notes: Notes) -> tuple[Any, MeshAssets]:
 
 
 def _sentence(said: object) -> str:
-    """Return a MuJoCo message on one line, shortened in the middle if it is long."""
+    """Return a MuJoCo message on one line, cut to `_LONGEST_REASON` characters in the middle."""
     text = " ".join(str(said).removeprefix("Error: ").split())
     half = _LONGEST_REASON // 2
     return text if len(text) <= _LONGEST_REASON else f"{text[:half]} ... {text[-half:]}"
 
 
 def _spec(mujoco: Any, path: str) -> Any:
+    """Return the specification of a model file, with all bodies and visual geoms kept."""
     spec = mujoco.MjSpec.from_file(path)
     spec.compiler.fusestatic = False
     spec.compiler.discardvisual = False
     return spec
 
 
-def _strip(mujoco: Any, spec: Any, assets: MeshAssets) -> None:
-    """Remove elements without effect on the motion, whose files may be missing.
+def _remove_unneeded(mujoco: Any, spec: Any, assets: MeshAssets) -> None:
+    """Remove elements from a model specification that do not affect the motion.
 
-    A mesh without effect on the inertia is replaced by a sphere, which keeps its pose.
+    `mujoco` is the module, `spec` the MjSpec, which is changed. A mesh without effect on the
+    inertia is replaced by a sphere, which keeps its pose, and is recorded in `assets`.
     """
     for kind in ("sensors", "pairs", "excludes", "skins", "cameras", "lights", "tuples"):
         for element in list(getattr(spec, kind)):
             spec.delete(element)
-    for number, geom in enumerate(list(_without_part(mujoco, spec))):
+    for number, geom in enumerate(list(_geoms_without_inertia(mujoco, spec))):
         asset = assets.of_meshes.get(geom.meshname)
         if asset is None or geom.type == mujoco.mjtGeom.mjGEOM_SDF:
             spec.delete(geom)
@@ -1354,8 +1528,8 @@ def _strip(mujoco: Any, spec: Any, assets: MeshAssets) -> None:
         spec.delete(asset)
 
 
-def _without_part(mujoco: Any, spec: Any) -> Iterator[Any]:
-    """Yield geoms with assets that do not contribute to the inertia."""
+def _geoms_without_inertia(mujoco: Any, spec: Any) -> Iterator[Any]:
+    """Yield geoms of an MjSpec with mesh or height-field files that have no effect on inertias."""
     always = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
     kinds = mujoco.mjtGeom
     with_assets = (kinds.mjGEOM_MESH, kinds.mjGEOM_HFIELD, kinds.mjGEOM_SDF)
@@ -1368,12 +1542,14 @@ def _without_part(mujoco: Any, spec: Any) -> Iterator[Any]:
 
 
 def _gravity(mjcf: MjcfModel) -> tuple[float, ...]:
+    """Return the acceleration of gravity (3,) in the world [m/s^2]; zero if it is disabled."""
     if not mjcf.flags.gravity:
         return (0.0, 0.0, 0.0)
     return tuple(float(value) for value in mjcf.data.opt.gravity)
 
 
 def _body(mjcf: MjcfModel, k: int) -> Body:
+    """Return body k with its mass, centre of mass and inertia about the centre of mass."""
     model, kinds = mjcf.data, mjcf.mujoco.mjtSameFrame
     # MuJoCo treats frames that differ by 1e-8 as equal, and computes with equal frames
     same = int(model.body_sameframe[k])

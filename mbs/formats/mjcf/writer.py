@@ -21,6 +21,7 @@ from mbs.formats.link_table import (
     FileLoop,
     LinkTable,
     Place,
+    central_inertia,
 )
 from mbs.formats.mjcf.shared import numbered_name
 from mbs.formats.rotations import quaternion_of
@@ -57,12 +58,22 @@ def write_mjcf(table: LinkTable, path: str | os.PathLike[str], note: str = "") -
 
 
 def refusal(name: str, what: str, remedy: str) -> ModelError:
-    """Return the error about a part of a robot that the format does not support."""
+    """Return the error about a part of a robot that the MJCF format does not support.
+
+    Args:
+        name: name of the robot.
+        what: the part and the reason.
+        remedy: what the user can do.
+    """
     return ModelError(f"{name}/{what}; {remedy}")
 
 
 def is_identity(T: Array) -> bool:
-    """Whether a transform (4, 4) is the identity, except for rounding."""
+    """Whether a transform is the identity, except for rounding (`SAME` [m or 1]).
+
+    Args:
+        T: homogeneous matrix (4, 4).
+    """
     return bool(np.max(np.abs(T[:3, 3])) < SAME and np.max(np.abs(T[:3, :3] - np.eye(3))) < SAME)
 
 
@@ -85,7 +96,11 @@ class _MjcfWriter:
     names: set[str] = field(default_factory=set)
 
     def model(self) -> Element:
-        """Return the root element of the file."""
+        """Return the root element of the file; call it once.
+
+        Raises:
+            ModelError: the format does not support a part of the robot, or a number is not finite.
+        """
         table = self.table
         for link in table.links:
             self.names |= {link.name, *link.bodies}
@@ -115,17 +130,21 @@ class _MjcfWriter:
         return root
 
     def _refuse(self, what: str, remedy: str) -> ModelError:
+        """Return the error for the unsupported part `what` of this robot."""
         return refusal(self.table.name, what, remedy)
 
     def _text(self, values: Iterable[float]) -> str:
-        """Format values separated by blanks, with all digits of a double."""
+        """Format values separated by blanks, with all digits of a double.
+
+        Raise a ModelError if a value is not finite.
+        """
         flat = list(values)
         if not np.all(np.isfinite(flat)):
             raise self._refuse("a number of the file is not finite", "give every parameter a value")
         return text_of(flat)
 
     def _place(self, T: Array) -> dict[str, str]:
-        """Return the attributes pos and quat of a frame, omitted if they are the identity."""
+        """Return the XML attributes pos and quat of a pose (4, 4); identity parts are omitted."""
         p, R = T[:3, 3], T[:3, :3]
         found = {}
         if np.max(np.abs(p)) > 0:
@@ -137,6 +156,7 @@ class _MjcfWriter:
     # Bodies and their joints.
 
     def _add_link(self, link: FileLink) -> Element:
+        """Append the body of a link, with inertia, joint and further bodies; return its element."""
         is_free = link.motion is Motion.FREE
         if is_free and not is_identity(link.joint_pose):
             raise self._refuse(
@@ -155,6 +175,7 @@ class _MjcfWriter:
         return body
 
     def _unused_name(self, name: str) -> str:
+        """Return a name that is not used in the file yet, based on `name`, and mark it as used."""
         found = numbered_name(name, self.names)
         self.names.add(found)
         return found
@@ -162,15 +183,12 @@ class _MjcfWriter:
     def _add_inertia(self, body: Element, link: FileLink) -> None:
         """Append <inertial>: mass, centre of mass, principal moments about it and their axes."""
         R, p = link.frame[:3, :3].copy(), link.frame[:3, 3].copy()
-        XX, XY, XZ, YY, YZ, ZZ, *first, mass = (float(value) for value in link.inertia)
-        J = np.array([[XX, XY, XZ], [XY, YY, YZ], [XZ, YZ, ZZ]])
-        com = np.array(first) / mass if mass else np.zeros(3)
-        if not mass and np.any(first):
+        mass, com, J = central_inertia(link.inertia)
+        if not mass and np.any(link.inertia[6:9]):
             raise self._refuse(
                 f"{body.get('name')}: it has first moments and no mass, which MuJoCo refuses",
                 "give it the inertia of a body",
             )
-        J = J - mass * (com @ com * np.eye(3) - np.outer(com, com))
         if link.motion is Motion.REVOLUTE and link.antecedent < 0:
             # moments across an axis that does not move have no effect; robot tables omit them
             J[:2, :2] += max(0.0, J[2, 2] - J[0, 0] - J[1, 1]) / 2 * np.eye(2)
@@ -201,6 +219,7 @@ class _MjcfWriter:
         SubElement(body, "inertial", given)
 
     def _add_joint(self, body: Element, link: FileLink) -> None:
+        """Append the joint of a link with its friction, spring, limits and rotor inertia."""
         given: dict[str, str] = {"name": link.name, "type": _TYPES[link.motion]}
         if link.motion is not Motion.FREE:
             given |= {"pos": self._text(link.joint_frame[:3, 3])}
@@ -222,17 +241,20 @@ class _MjcfWriter:
         SubElement(body, "joint", given)
 
     def _add_site(self, name: str, place: Place) -> str:
+        """Append a site to the body at `place` (link index and pose), and return its name."""
         number, pose = place
         SubElement(self.bodies[number], "site", {"name": name, **self._place(pose)})
         return name
 
     def _new_site(self, place: Place) -> str:
+        """Append a site at `place` (link index and pose), and return its generated name."""
         self.sites += 1
         return self._add_site(self._unused_name(f"point{self.sites}"), place)
 
     # Loops and couplings.
 
     def _close(self, equalities: Element, loop: FileLoop) -> None:
+        """Append the equalities that close a loop to the element `equalities`."""
         joint = loop.joint
         if loop.welded or isinstance(joint, Fixed):
             self._equality(equalities, "weld", joint.name, loop.ends[0])
@@ -260,16 +282,19 @@ class _MjcfWriter:
     def _equality(
         self, equalities: Element, kind: str, name: str, pair: tuple[Place, Place]
     ) -> None:
+        """Append an equality of the given kind between two new sites at the frames of `pair`."""
         one, two = self._new_site(pair[0]), self._new_site(pair[1])
         SubElement(equalities, kind, name=name, site1=one, site2=two)
 
     def _tendon_equality(
         self, equalities: Element, name: str, tendon: str, constant: float
     ) -> None:
+        """Append the equality: length of a tendon = its length at qpos0 + constant [m or rad]."""
         polynomial = self._text([constant, 0.0, 0.0, 0.0, 0.0])
         SubElement(equalities, "tendon", name=name, tendon1=tendon, polycoef=polynomial)
 
     def _couple(self, equalities: Element, coupling: FileCoupling) -> None:
+        """Append a coupling as a joint equality, or as a fixed tendon for more than two joints."""
         names, terms = self.table.positions, coupling.coefficients
         if len(terms) > (2 if coupling.others else _LONGEST_POLYNOMIAL):
             raise self._refuse(
@@ -295,6 +320,10 @@ class _MjcfWriter:
         self._tendon_equality(equalities, coupling.name, tendon, constant)
 
     def _fixed_tendon(self, name: str, levers: Mapping[str, float], given: dict[str, str]) -> None:
+        """Append a fixed tendon: sum of factors times joint positions.
+
+        `levers` are the factors by joint name, `given` further XML attributes.
+        """
         tendon = SubElement(self.tendons, "fixed", {"name": name, **given})
         for joint, factor in levers.items():
             if factor:
@@ -303,6 +332,7 @@ class _MjcfWriter:
     # Forces and motors.
 
     def _add_force(self, force: FileForce) -> None:
+        """Append a spring, damper or fixed tendon; raise a ModelError for other force elements."""
         element = force.element
 
         def text(name: str) -> str:
@@ -330,6 +360,7 @@ class _MjcfWriter:
             )
 
     def _motors(self) -> Element:
+        """Return an element with one motor per degree of freedom of the actuated joints."""
         actuators = Element("actuator")
         for link in self.table.links:
             if not link.actuated:

@@ -41,7 +41,16 @@ from mbs.errors import DescriptionError
 from mbs.formats.files import Notes
 from mbs.formats.rotations import inverse, matrix_of_angles, quaternion_of, transform
 from mbs.formats.sdf.shared import MODEL_GRAVITY, ROTOR_INERTIA
-from mbs.formats.urdf.reader import Inertial, KeptNames, Reader, Vector, body_of
+from mbs.formats.urdf.reader import (
+    Inertial,
+    Reader,
+    UniqueNames,
+    Vector,
+    body_of,
+    limits_of,
+    not_negative,
+    robot_name,
+)
 from mbs.formats.xml import line_of, parse_xml
 from mbs.mechanism import Mechanism
 from mbs.text import did_you_mean, quoted
@@ -72,20 +81,49 @@ written with six digits or more."""
 
 @dataclass(frozen=True, slots=True)
 class SdfReader(Reader):
-    """Reader of the numbers of one element, which adds notes about it."""
+    """Reader of the numbers and words in child elements of one SDF element, with notes about it."""
 
     def values(self, parent: Element | None, tag: str, default: Vector) -> Vector:
-        """Return the numbers in the child element `tag`, or the default if there is none."""
+        """Return the numbers in a child element, or the default if it is missing or empty.
+
+        Args:
+            parent: element that contains the child element; None counts as empty.
+            tag: name of the child element.
+            default: values by default, which give the required number of values.
+
+        Raises:
+            DescriptionError: the element has another number of values, or a value is not a number.
+        """
         element = None if parent is None else parent.find(tag)
         text = "" if element is None else (element.text or "").strip()
         return self.numbers(element, tag, text, len(default)) if text else default
 
     def value(self, parent: Element | None, tag: str, default: float) -> float:
-        """Return one number in the child element `tag`, or the default if there is none."""
+        """Return the number in a child element, or the default if it is missing or empty.
+
+        Args:
+            parent: element that contains the child element; None counts as empty.
+            tag: name of the child element.
+            default: value by default.
+
+        Raises:
+            DescriptionError: the text is not a number.
+        """
         return self.values(parent, tag, (default,))[0]
 
     def limit(self, parent: Element | None, tag: str, default: float) -> float:
-        """Return a number that may be infinite or NaN, or the default if there is none."""
+        """Return a number that may be NaN or infinite, or the default if it is missing or empty.
+
+        Magnitudes from `UNLIMITED` (1e16) count as infinite.
+
+        Args:
+            parent: element that contains the child element; None counts as empty.
+            tag: name of the child element.
+            default: value by default.
+
+        Raises:
+            DescriptionError: the text is not a number.
+        """
         element = None if parent is None else parent.find(tag)
         text = "" if element is None else (element.text or "").strip()
         if not text:
@@ -97,7 +135,16 @@ class SdfReader(Reader):
         return value if not abs(value) >= UNLIMITED else math.copysign(math.inf, value)
 
     def flag(self, parent: Element | None, tag: str, default: bool = False) -> bool:
-        """Return the truth value of the child element `tag`, or the default if there is none."""
+        """Return the truth value of a child element, or the default if it is missing or empty.
+
+        Args:
+            parent: element that contains the child element; None counts as empty.
+            tag: name of the child element.
+            default: value by default.
+
+        Raises:
+            DescriptionError: the text is not true, false, 1 or 0.
+        """
         word = self.word(parent, tag).lower()
         if word in ("true", "1"):
             return True
@@ -108,12 +155,27 @@ class SdfReader(Reader):
         return default
 
     def word(self, parent: Element | None, tag: str) -> str:
-        """Return the text of the child element `tag`, empty if there is none."""
+        """Return the text of a child element; empty if there is none.
+
+        Args:
+            parent: element that contains the child element; None counts as empty.
+            tag: name of the child element.
+        """
         element = None if parent is None else parent.find(tag)
         return "" if element is None else (element.text or "").strip()
 
     def pose(self, element: Element) -> tuple[str, Array]:
-        """Return the reference frame of the <pose> of an element (or "") and its matrix (4, 4)."""
+        """Return the reference frame and the matrix (4, 4) of the <pose> of an element.
+
+        The name of the reference frame is "" if it is not given. Without a <pose>, the matrix is
+        the identity.
+
+        Args:
+            element: element that contains <pose>.
+
+        Raises:
+            DescriptionError: the format of the rotation is unknown, or a number cannot be read.
+        """
         pose = element.find("pose")
         if pose is None:
             return "", np.eye(4)
@@ -134,6 +196,10 @@ class SdfReader(Reader):
         return relative, transform(R, numbers[:3])
 
     def _of_quaternion(self, quaternion: Vector) -> Array:
+        """Return the rotation matrix (3, 3) of a quaternion (x, y, z, w).
+
+        Raise a DescriptionError if its length differs from 1 by more than 1e-3.
+        """
         x, y, z, w = quaternion
         # 1e-3: quaternions are written with four digits or more
         if not abs(math.hypot(*quaternion) - 1) < 1e-3:
@@ -152,8 +218,9 @@ class _Frames:
 
     Attributes:
         path: path of the file.
-        places: reference frame of each frame, and its pose in the reference frame.
-        attached: frame or link to which a frame is rigidly attached, if it is not a link.
+        places: reference frame of each frame, and its pose (4, 4) relative to the reference frame.
+        attached: for each frame that is not a link, the frame or link to which it is rigidly
+            attached.
         known: cache of poses in the world.
     """
 
@@ -163,7 +230,10 @@ class _Frames:
     known: dict[str, Array] = field(default_factory=lambda: {"world": np.eye(4)})
 
     def in_world(self, frame: str) -> Array:
-        """Return the pose (4, 4) of a frame in the world."""
+        """Return the pose (4, 4) of a frame in the world.
+
+        Raise a DescriptionError for cyclic references.
+        """
         chain, met = [frame], {frame}
         while chain[-1] not in self.known:
             before = self.places[chain[-1]][0]
@@ -176,7 +246,7 @@ class _Frames:
             T = self.known[name] = T @ self.places[name][1]
         return T
 
-    def seen_from(self, other: str, frame: str) -> Array:
+    def relative_pose(self, other: str, frame: str) -> Array:
         """Return the pose (4, 4) of a frame relative to another frame.
 
         It is the exact product of poses if the frame is placed in the other frame.
@@ -191,7 +261,10 @@ class _Frames:
         return T if name == other else inverse(self.in_world(other)) @ wanted
 
     def carrier(self, frame: str) -> str:
-        """Return the link to which a frame is rigidly attached, or the world."""
+        """Return the name of the link to which a frame is rigidly attached, or "world".
+
+        Raise a DescriptionError for cyclic references.
+        """
         name, met = frame, set[str]()
         while name in self.attached:
             if name in met:
@@ -202,6 +275,7 @@ class _Frames:
         return name
 
     def _cycle(self, name: str, how: str) -> NoReturn:
+        """Raise a DescriptionError: frame `name` is placed in, or attached to (`how`), itself."""
         raise DescriptionError(
             f"{self.path}: frame {quoted(name)} is {how} itself through others; break the cycle"
         )
@@ -212,11 +286,11 @@ class _Frames:
 
 @dataclass(frozen=True, slots=True)
 class _Scope:
-    """Model as the scope of names.
+    """Model in which names are resolved (scope of names).
 
     Attributes:
-        key: full name of its frame.
-        prefix: prefix of the full names of its elements.
+        key: full name of the frame of the model.
+        prefix: prefix of the full names of its elements, such as "arm::".
     """
 
     key: str
@@ -225,11 +299,11 @@ class _Scope:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """Link, joint or frame.
+    """Link, joint or frame of a model.
 
     Attributes:
-        key: full name of its frame.
-        name: its full name.
+        key: unique key of its frame; differs from the name for some joints of old files.
+        name: full name of the element, with the names of enclosing models.
         scope: model that contains it.
         element: XML element.
     """
@@ -285,10 +359,10 @@ class _SdfFile:
 
     Attributes:
         notes: notes of the file.
-        version: version of the format.
+        version: version of the format, such as (1, 7).
         frames: frames of links, joints, frames and models.
-        links, joints, named: links, joints and named frames, by the full names of their frames.
-        scopes: elements of each model.
+        links, joints, named: links, joints and named frames, by the keys of their frames.
+        scopes: elements of each model, by the key of the model.
     """
 
     notes: Notes
@@ -300,11 +374,21 @@ class _SdfFile:
     scopes: dict[str, list[_Part]] = field(default_factory=dict)
 
     def reader(self, part: _Part) -> SdfReader:
-        """Return a reader of the numbers of a part."""
+        """Return a reader of the numbers of a link, joint or frame."""
         return SdfReader(f"{part.element.tag} {quoted(part.name)}", part.element, self.notes)
 
     def add_model(self, element: Element, name: str, outer: _Scope | None) -> None:
-        """Register the parts of a model and of its nested models."""
+        """Register links, joints and frames of a model and its nested models, without poses.
+
+        Args:
+            element: XML element of the model.
+            name: full name of the model.
+            outer: model that contains it; None for the outermost model.
+
+        Raises:
+            DescriptionError: a name is missing or used twice, or an unsupported element changes the
+                motion.
+        """
         prefix = "" if outer is None else f"{name}::"
         scope = _Scope("__model__" if outer is None else name, prefix)
         reader = SdfReader(f"model {quoted(name)}", element, self.notes)
@@ -329,7 +413,16 @@ class _SdfFile:
         )
 
     def place_model(self, element: Element, name: str, outer: _Scope | None) -> None:
-        """Place a model and its parts, after all names are registered."""
+        """Set the poses of a model, its parts and nested models, after all names are registered.
+
+        Args:
+            element: XML element of the model.
+            name: full name of the model.
+            outer: model that contains it; None for the outermost model.
+
+        Raises:
+            DescriptionError: a pose cannot be read or refers to an unknown frame.
+        """
         reader = SdfReader(f"model {quoted(name)}", element, self.notes)
         scope = _Scope("__model__", "") if outer is None else _Scope(name, f"{name}::")
         relative, T = reader.pose(element)
@@ -347,29 +440,43 @@ class _SdfFile:
         for child in element.findall("model"):
             self.place_model(child, scope.prefix + self._name(child), scope)
         if outer is None:
-            self._put_by_placement(element, name, scope)
+            self._apply_placement_frames(element, name, scope)
 
-    def _put_by_placement(self, element: Element, name: str, scope: _Scope) -> None:
-        """Move models that are placed by one of their own frames, nested models first."""
+    def _apply_placement_frames(self, element: Element, name: str, scope: _Scope) -> None:
+        """Set the poses of models with a placement_frame, which is a frame inside the model.
+
+        Nested models are placed first. `name` is the full name of the model, `scope` its scope of
+        names.
+        """
         for child in element.findall("model"):
             inner = scope.prefix + self._name(child)
-            self._put_by_placement(child, inner, _Scope(inner, f"{inner}::"))
+            self._apply_placement_frames(child, inner, _Scope(inner, f"{inner}::"))
         placement = element.get("placement_frame", "").strip()
         if placement:
             reader = SdfReader(f"model {quoted(name)}", element, self.notes)
             at = self.resolved(reader, scope, placement, "placement_frame")
             reference, T = self.frames.places[scope.key]
-            T = T @ inverse(self.frames.seen_from(scope.key, at))
+            T = T @ inverse(self.frames.relative_pose(scope.key, at))
             self.frames.places[scope.key] = reference, T
             self.frames.known = {"world": np.eye(4)}
 
     def cuts(self, joint: _Part) -> bool:
-        """Whether the file requires that a loop is cut at this joint."""
+        """Whether the file requires that a loop is cut at this joint (must_be_loop_joint)."""
         simbody = joint.element.find("physics/simbody")
         return simbody is not None and self.reader(joint).flag(simbody, "must_be_loop_joint")
 
     def resolved(self, reader: SdfReader, scope: _Scope, name: str, what: str) -> str:
-        """Return the full name of a frame that an element refers to."""
+        """Return the full name of a frame that an element refers to.
+
+        Args:
+            reader: reader of the element.
+            scope: model that contains the element.
+            name: name of the frame in the file.
+            what: attribute or child element that contains the name, such as "relative_to".
+
+        Raises:
+            DescriptionError: there is no such frame.
+        """
         if name == "__model__":
             return scope.key
         if name == "world" and what in ("parent", "child", "gearbox_reference_body"):
@@ -382,6 +489,7 @@ class _SdfFile:
         return full
 
     def _name(self, element: Element) -> str:
+        """Return the name of an element; raise a DescriptionError if it is empty or "world"."""
         name = (element.get("name") or "").strip()
         if not name or name == "world":
             raise DescriptionError(
@@ -391,6 +499,10 @@ class _SdfFile:
         return name
 
     def _add(self, element: Element, scope: _Scope, parts: dict[str, _Part]) -> None:
+        """Register a link, joint or frame of the model `scope` in `parts`.
+
+        Raise a DescriptionError if its name is missing or used.
+        """
         name = scope.prefix + self._name(element)
         key = name
         if parts is self.joints and name in self.links and self.version < (1, 7):
@@ -406,7 +518,7 @@ class _SdfFile:
         self._note_unread(self.reader(parts[key]))
 
     def _place(self, part: _Part) -> None:
-        """Set the pose of a part and the frame to which it is attached."""
+        """Set the pose of a link, joint or frame, and the frame to which it is attached."""
         reader, scope = self.reader(part), part.scope
         default = scope.key
         if part.key in self.joints:
@@ -422,7 +534,10 @@ class _SdfFile:
         self.frames.places[part.key] = default, T
 
     def _note_unread(self, reader: SdfReader) -> None:
-        """Add notes about unknown elements; raise if an element would change the motion."""
+        """Add notes about unknown child elements.
+
+        Raise a DescriptionError if one changes the motion.
+        """
         tag = reader.element.tag
         for child in reader.element:
             if child.tag in _SILENT[tag]:
@@ -441,20 +556,20 @@ class _SdfFile:
 
 
 @dataclass(slots=True)
-class _SdfBuilding:
+class _SdfBuilder:
     """Builder of a mechanism from the links and joints of a file.
 
     Attributes:
         mechanism: mechanism under construction.
         file: parsed content of the file.
-        base: base option of the user.
+        base: "free", "fixed" or None, as for `read_sdf`.
         static: whether all links are fixed to the world.
         gravity: acceleration of gravity [m/s^2].
         names: names of the components.
         points: frame of each link and of the world, by full name.
-        coordinates: names of coordinates, by joint and "axis" or "axis2".
-        kept: parent and child link of each joint of the mechanism.
-        between: joints that connect two links.
+        coordinates: names of joint coordinates, by joint and "axis" or "axis2".
+        kept: parent and child link of each joint of the mechanism, by joint.
+        between: joints that connect two links, by the set of the two links.
     """
 
     mechanism: Mechanism
@@ -462,13 +577,17 @@ class _SdfBuilding:
     base: Base | None
     static: bool
     gravity: Vector
-    names: KeptNames
+    names: UniqueNames
     points: dict[str, Point] = field(default_factory=dict)
     coordinates: dict[tuple[str, str], str] = field(default_factory=dict)
     kept: dict[str, tuple[str, str]] = field(default_factory=dict)
     between: dict[frozenset[str], list[str]] = field(default_factory=dict)
 
     def build(self) -> None:
+        """Add all bodies, joints, couplings, frames and start positions to the mechanism.
+
+        Raise a DescriptionError if a part of the file is invalid or not supported.
+        """
         file, mechanism = self.file, self.mechanism
         self.points["world"] = mechanism.world.frame
         groups = self._groups()
@@ -495,20 +614,26 @@ class _SdfBuilding:
                 self._add_mimic(joint, tag)
         for key, frame in file.named.items():
             carrier = file.frames.carrier(key)
-            pose = file.frames.seen_from(carrier, key)
+            pose = file.frames.relative_pose(carrier, key)
             mechanism.add_frame(self._name(frame, "frame"), _at(self.points[carrier], pose))
 
     def _name(self, part: _Part, suffix: str) -> str:
+        """Return a valid and unique component name for a part, with a note if it is changed.
+
+        `suffix` is appended to a name that is already used.
+        """
         why = "another part, the world or the base of all models has this name"
-        return self.names.give(self.file.reader(part), part.name, suffix, why)
+        return self.names.assign(self.file.reader(part), part.name, suffix, why)
 
     def _unused(self, name: str) -> str:
+        """Return `name` with underscores appended until it is unused, and mark it as used."""
         while name in self.names.taken or name in self.names.wanted:
             name += "_"
         self.names.taken.add(name)
         return name
 
     def _kind(self, joint: _Part) -> str:
+        """Return the type of a joint; raise a DescriptionError if it is unknown."""
         kind = joint.element.get("type", "").strip()
         if kind not in _KINDS:
             reader = self.file.reader(joint)
@@ -518,9 +643,11 @@ class _SdfBuilding:
     # Connected groups of links, and their connection to the world.
 
     def _groups(self) -> _Groups:
-        """Return the groups of connected links.
+        """Return the groups of connected links, and record the links of each joint in `kept`.
 
-        Fixed joints are processed first, so that they do not close loops.
+        Fixed joints are processed first and joints marked as loop joints last; the remaining joints
+        that connect links of one group close loops. Raise a DescriptionError if a joint refers to
+        an unknown link or connects a link with itself.
         """
         file = self.file
         groups = _Groups({key: key for key in ("world", *file.links)})
@@ -553,7 +680,7 @@ class _SdfBuilding:
         return groups
 
     def _add_roots(self, groups: _Groups) -> None:
-        """Connect each group without a joint to the world by a free or fixed joint."""
+        """Connect each group of links without a joint to the world by a free or fixed joint."""
         file, mechanism = self.file, self.mechanism
         children = {child for _, child in self.kept.values()}
         canonical = file.frames.carrier("__model__")
@@ -585,6 +712,10 @@ class _SdfBuilding:
     # Bodies.
 
     def _body(self, link: _Part) -> Body:
+        """Add the body of a link, and a force against gravity if the file disables gravity for it.
+
+        Raise a DescriptionError if the link is kinematic or has a velocity decay.
+        """
         reader, element = self.file.reader(link), link.element
         if reader.flag(element, "kinematic"):
             reader.fail("it is kinematic, moved from outside; take <kinematic> out")
@@ -604,7 +735,10 @@ class _SdfBuilding:
         return body
 
     def _inertial(self, reader: SdfReader, inertial: Element | None) -> Inertial:
-        """Return the inertial of a link. Missing values are 1 kg and 1 kg m^2."""
+        """Return mass and inertia of a link; missing values are 1 kg and 1 kg m^2, with a note.
+
+        `inertial` is its XML element. Raise a DescriptionError if it needs shapes or fluids.
+        """
         if inertial is None:
             text = "it has no <inertial>; of 1 kg and 1 kg m^2, as the format has it"
             reader.note("completed", text)
@@ -635,11 +769,16 @@ class _SdfBuilding:
     # Joints.
 
     def _connect(self, joint: _Part, name: str, closes: bool) -> None:
+        """Connect the links of a joint by a component `name`, and cut loops there if required.
+
+        `closes` is True if the joint closes a loop. A fixed joint without a name becomes a rigid
+        connection.
+        """
         kind, reader = self._kind(joint), self.file.reader(joint)
         if kind == "gearbox":
             return
         a, b = (
-            _at(self.points[end], self.file.frames.seen_from(end, joint.key))
+            _at(self.points[end], self.file.frames.relative_pose(end, joint.key))
             for end in self.kept[joint.key]
         )
         connect = self.mechanism.connect
@@ -671,7 +810,10 @@ class _SdfBuilding:
     def _connect_two(
         self, joint: _Part, reader: SdfReader, name: str, ends: tuple[Point, Point]
     ) -> Joint:
-        """Connect a universal joint, or two revolute joints in series; return the last joint."""
+        """Connect a universal joint, or two revolute joints in series; return the last joint.
+
+        `ends` are the joint frames on the parent and the child link.
+        """
         a, b = ends
         first = self._one_axis(joint, reader, f"{name}_1", "revolute")
         second = self._one_axis(joint, reader, f"{name}_2", "revolute", "axis2")
@@ -711,7 +853,10 @@ class _SdfBuilding:
         return last
 
     def _pitch(self, reader: SdfReader, element: Element) -> float:
-        """Return the advance per revolution [m], positive for a right-hand thread."""
+        """Return the advance of a screw per revolution [m], positive for a right-hand thread.
+
+        Raise a DescriptionError if thread_pitch is zero.
+        """
         if reader.word(element, "screw_thread_pitch") or not reader.word(element, "thread_pitch"):
             return reader.value(element, "screw_thread_pitch", 1.0)
         turns = reader.value(element, "thread_pitch", 1.0)  # rad/m of a left-hand thread
@@ -720,7 +865,10 @@ class _SdfBuilding:
         return -2 * math.pi / turns
 
     def _axis(self, joint: _Part, reader: SdfReader, tag: str) -> tuple[float, float, float]:
-        """Return the unit vector of an axis in the frame of the joint."""
+        """Return the unit vector (x, y, z) of a joint axis in the frame of the joint.
+
+        `tag` is "axis" or "axis2". Raise a DescriptionError if the axis has zero length.
+        """
         file, element = self.file, joint.element.find(tag)
         if element is None:
             reader.note("completed", f"it has no <{tag}>; taken as 0 0 1")
@@ -735,13 +883,17 @@ class _SdfBuilding:
             within = "__model__"
         if within:
             key = file.resolved(reader, joint.scope, within, "expressed_in")
-            xyz = file.frames.seen_from(joint.key, key)[:3, :3] @ xyz
+            xyz = file.frames.relative_pose(joint.key, key)[:3, :3] @ xyz
         x, y, z = (float(value) for value in xyz / length)
         return x, y, z
 
     def _one_axis(
         self, joint: _Part, reader: SdfReader, name: str, kind: str, tag: str = "axis"
     ) -> Revolute | Prismatic:
+        """Return the revolute or prismatic component `name` of the joint axis `tag`.
+
+        `kind` is the type of the joint; a "continuous" joint has no limits.
+        """
         element = joint.element.find(tag)
         dynamics = None if element is None else element.find("dynamics")
         limit = None if element is None else element.find("limit")
@@ -770,27 +922,27 @@ class _SdfBuilding:
         )
 
     def _positive(self, reader: SdfReader, parent: Element | None, tag: str) -> float:
-        value = reader.value(parent, tag, 0.0)
-        if value >= 0:
-            return value
-        reader.note("ignored", f"{tag} is {value:g}, less than zero; taken as 0", parent)
-        return 0.0
+        """Return the number in the child element `tag`.
+
+        A negative number counts as 0, with a note.
+        """
+        return not_negative(reader, parent, tag, reader.value(parent, tag, 0.0))
 
     def _limits(self, reader: SdfReader, limit: Element | None) -> tuple[float, float] | None:
+        """Return the position limits (lower, upper) of a joint from its <limit> element.
+
+        None unless both are finite and ordered; see `limits_of`.
+        """
         low = reader.limit(limit, "lower", -math.inf)
-        high = reader.limit(limit, "upper", math.inf)
-        if low < high and math.isfinite(low) and math.isfinite(high):
-            return low, high
-        if (low, high) != (-math.inf, math.inf):
-            how = "have one end" if low < high else "leave it no range"
-            text = f"its limits ({low:g}, {high:g}) {how}; taken as unlimited"
-            reader.note("doubted", text, limit)
-        return None
+        return limits_of(reader, limit, low, reader.limit(limit, "upper", math.inf))
 
     # Gears and mimics.
 
     def _add_gears(self, gears: _Part) -> None:
-        """Add theta_2 = -ratio theta_1, for angles of child and parent relative to a third link."""
+        """Add theta_2 = -ratio theta_1, for angles of child and parent relative to a third link.
+
+        Raise a DescriptionError if the ratio is zero or an angle is not that of a revolute joint.
+        """
         reader, file = self.file.reader(gears), self.file
         word = reader.word(gears.element, "gearbox_reference_body")
         third = file.frames.carrier(
@@ -809,7 +961,12 @@ class _SdfBuilding:
         self.mechanism.add(Coupling(name, driven, driver, (0.0, factor)))
 
     def _angle(self, reader: SdfReader, third: str, link: str, axis: Array) -> tuple[str, float]:
-        """Return the joint between two links, and the sign of its angle about a world axis."""
+        """Return the coordinate of the revolute joint between two links, and its sign.
+
+        The sign is +1 if the coordinate is the rotation of `link` relative to the link `third`
+        about `axis` (3,), a unit vector in world axes; it is -1 for the opposite rotation. Raise a
+        DescriptionError if no revolute joint about this axis connects them.
+        """
         file = self.file
         for key in self.between.get(frozenset((third, link)), ()):
             joint, ends = file.joints[key], self.kept[key]
@@ -825,6 +982,11 @@ class _SdfBuilding:
         )
 
     def _add_mimic(self, joint: _Part, tag: str) -> None:
+        """Add the mimic of a joint axis (`tag` "axis" or "axis2") as a coupling, if it has one.
+
+        Raise a DescriptionError if the joint that it follows is unknown or the multiplier is
+        missing.
+        """
         element = joint.element.find(f"{tag}/mimic")
         if element is None:
             return
@@ -845,33 +1007,43 @@ class _SdfBuilding:
 
 
 class _Groups:
-    """Groups of connected links as a disjoint-set forest; the root represents its group."""
+    """Groups of connected links, stored as a disjoint-set forest.
+
+    Each group has a representative link, its root.
+
+    Attributes:
+        above: parent of each link in the forest; a root is its own parent.
+        closing: joints that connect two links of the same group, and so close a loop.
+    """
 
     def __init__(self, above: dict[str, str]) -> None:
         self.above = above
         self.closing: set[str] = set()
 
     def root(self, key: str) -> str:
-        """Return the representative of the group of a link."""
+        """Return the link that represents the group of a link."""
         while self.above[key] != key:
             self.above[key] = self.above[self.above[key]]
             key = self.above[key]
         return key
 
     def join(self, joint: str, one: str, other: str) -> None:
-        """Connect two links by a joint, and record whether it closes a loop."""
+        """Connect the links `one` and `other` by a joint.
+
+        If they were already connected, the joint is recorded in `closing`.
+        """
         a, b = self.root(one), self.root(other)
         if a == b:
             self.closing.add(joint)
         self.above[a] = b
 
     def closes(self, joint: str) -> bool:
-        """Whether a joint connects links that were already connected."""
+        """Whether a joint connected links that were already connected when `join` was called."""
         return joint in self.closing
 
 
 def _at(point: Point, T: Array) -> Point:
-    """Return a point displaced by a transform (4, 4)."""
+    """Return the frame with the pose T (4, 4) relative to the frame `point`."""
     R = T[:3, :3]
     x, y, z = (float(value) for value in T[:3, 3])
     turned = None if np.abs(R - np.eye(3)).max() <= _SAME else R.tolist()
@@ -897,6 +1069,9 @@ def read_sdf(path: str | Path, *, base: Base | None = None, strict: bool = False
             is None, and moves otherwise.
         strict: whether to raise an error instead of adding a note.
 
+    Returns:
+        The mechanism. Its `notes` list ignored, changed and completed elements.
+
     Raises:
         DescriptionError: the file is missing or malformed, has several models that move, or
             contains an unsupported element that changes the motion. In strict mode, also for each
@@ -912,10 +1087,7 @@ def read_sdf(path: str | Path, *, base: Base | None = None, strict: bool = False
         )
     file = _SdfFile(notes, _version(root, notes), _Frames(str(path)))
     world, model = _choose(root, notes)
-    name = component_name(model.get("name") or "")
-    if not name:
-        name = component_name(Path(path).stem) or "robot"
-        notes.add("completed", "<model>", f"it has no name; named {quoted(name)}", line_of(model))
+    name = robot_name(model, notes)
     gravity: Vector = MODEL_GRAVITY
     if world is not None:
         gravity = _read_world(file, world)
@@ -932,14 +1104,14 @@ def read_sdf(path: str | Path, *, base: Base | None = None, strict: bool = False
         still = "its links are welded to the world" if base is None else "its base was given"
         reader.note("ignored", f"it is static; {still}")
     parts = (*file.links.values(), *file.joints.values(), *file.named.values())
-    names = KeptNames({"world", "base"}, {component_name(part.name) for part in parts})
-    _SdfBuilding(mechanism, file, base, static and base is None, gravity, names).build()
+    names = UniqueNames({"world", "base"}, {component_name(part.name) for part in parts})
+    _SdfBuilder(mechanism, file, base, static and base is None, gravity, names).build()
     _note_visuals(file)
     return mechanism
 
 
 def _note_visuals(file: _SdfFile) -> None:
-    """Add one note about the visuals, which are not read."""
+    """Add one note about the visuals of all links, which are not read."""
     counts = {link.name: len(link.element.findall("visual")) for link in file.links.values()}
     drawn = [quoted(name) for name, count in counts.items() if count]
     if drawn:
@@ -950,6 +1122,10 @@ def _note_visuals(file: _SdfFile) -> None:
 
 
 def _version(root: Element, notes: Notes) -> tuple[int, ...]:
+    """Return (major, minor) version of a file, limited to the supported versions with a note.
+
+    Raise a DescriptionError if the version is not of the form 1.4.
+    """
     text = root.get("version", "").strip()
     words = text.split(".")
     if not text:
@@ -969,7 +1145,11 @@ def _version(root: Element, notes: Notes) -> tuple[int, ...]:
 
 
 def _choose(root: Element, notes: Notes) -> tuple[Element | None, Element]:
-    """Return the world element, if there is one, and the model element to read."""
+    """Return the world element (None if there is none) and the model element to read.
+
+    It is the only model that moves, or else the only model. Raise a DescriptionError if there is
+    none or more than one.
+    """
     worlds = root.findall("world")
     if len(worlds) > 1:
         raise DescriptionError(f"{notes.path}: there are {len(worlds)} worlds; give a file of one")
@@ -995,11 +1175,16 @@ def _choose(root: Element, notes: Notes) -> tuple[Element | None, Element]:
 
 
 def _is_static(model: Element) -> bool:
+    """Whether a <model> element is marked as static."""
     return (model.findtext("static") or "").strip().lower() in ("true", "1")
 
 
 def _read_world(file: _SdfFile, world: Element) -> Vector:
-    """Return the gravity of a world. Its frames are registered, and unread elements are noted."""
+    """Return the gravity (3,) of a world element [m/s^2].
+
+    Its frames are registered in `file`, and unread elements are noted. Raise a DescriptionError if
+    the world has joints.
+    """
     reader = SdfReader(f"world {quoted(world.get('name', ''))}", world, file.notes)
     if world.find("joint") is not None:
         reader.fail("it has joints of its own, between models; write them in the model")
@@ -1021,7 +1206,7 @@ def _read_world(file: _SdfFile, world: Element) -> Vector:
 
 
 def _refuse_parts(reader: SdfReader, model: Element) -> None:
-    """Raise if the model includes parts from other files."""
+    """Raise a DescriptionError if the model includes parts from other files."""
     for element in model.iter("include"):
         uri = quoted((element.findtext("uri") or "").strip())
         reader.fail(f"it includes {uri}, which is not read; put the whole model in one file")

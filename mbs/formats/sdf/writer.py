@@ -61,7 +61,12 @@ def write_sdf(table: LinkTable, path: str | os.PathLike[str], note: str = "") ->
 
 
 def refusal(name: str, what: str) -> ModelError:
-    """Return the error about a part of a robot that the format does not support."""
+    """Return the error about a part of a robot that the SDF format does not support.
+
+    Args:
+        name: name of the robot.
+        what: the part that is not supported.
+    """
     return ModelError(f"{name}: {what}, which SDF cannot say; take it away first")
 
 
@@ -72,7 +77,7 @@ class _SdfWriter:
     Attributes:
         table: tables of the robot.
         links: name of each link in the file, by index (-1 for the world).
-        joints: XML element of the joint of each position with one axis, by index.
+        joints: XML element of each revolute or prismatic joint, by index of its position.
         names: names in the file, by name in the tables.
     """
 
@@ -82,12 +87,16 @@ class _SdfWriter:
     names: dict[str, str] = field(default_factory=dict)
 
     def file(self) -> Element:
+        """Return the root element of the file; call it once.
+
+        Raise a ModelError if the format does not support a part of the robot.
+        """
         table = self.table
         root = Element("sdf", {"version": "1.11", "xmlns:drake": _NAMESPACE})
         place = root
         if not np.array_equal(table.gravity, MODEL_GRAVITY):
             place = SubElement(root, "world", name="default")
-            _say(place, "gravity", text_of(table.gravity))
+            _append(place, "gravity", text_of(table.gravity))
         model = SubElement(place, "model", name=self._name(table.name))
         self.names.clear()
         for j, link in enumerate(table.links):
@@ -108,7 +117,7 @@ class _SdfWriter:
         return self.names[name]
 
     def _unused_name(self, name: str) -> str:
-        """Return a name in the file, based on `name`, that no part of the robot has."""
+        """Return an unused name in the file: `name` with underscores appended if necessary."""
         known = {*self.table.frames, "base", "world"}
         while name in self.names or name in known or name in self.names.values():
             name += "_"
@@ -117,6 +126,7 @@ class _SdfWriter:
     # Links and the joints that move them.
 
     def _add_link(self, model: Element, j: int, link: FileLink) -> None:
+        """Append link j and the joint to its parent; free joints have no element in the format."""
         if link.body:
             name = self._name(link.body)
         else:
@@ -139,7 +149,7 @@ class _SdfWriter:
         """Append axis, dynamics, limits and motor of a revolute or prismatic joint."""
         zero = float(self.table.drawn[link.position])
         axis = SubElement(joint, "axis")
-        _say(axis, "xyz", "0 0 1")
+        _append(axis, "xyz", "0 0 1")
         dynamics = {
             "damping": link.Fv,
             "friction": link.Fs,
@@ -148,18 +158,19 @@ class _SdfWriter:
         }
         element = SubElement(axis, "dynamics")
         for tag, value in dynamics.items():
-            _say(element, tag, value)
+            _append(element, tag, value)
         velocity, effort = largest_of(self.table, link, "SDF", UNLIMITED)
         limit = self._limit(axis, link.limits, zero)
         for tag, most in (("effort", effort if link.actuated else 0.0), ("velocity", velocity)):
-            _say(limit, tag, math.inf if most >= UNLIMITED else most)
+            _append(limit, tag, math.inf if most >= UNLIMITED else most)
         if link.Ia:
-            _say(joint, ROTOR_INERTIA, link.Ia)
+            _append(joint, ROTOR_INERTIA, link.Ia)
 
     def _limit(self, axis: Element, limits: Range | None, zero: float) -> Element:
+        """Append <limit> with limits relative to the position `zero`, and return the element."""
         limit = SubElement(axis, "limit")
         for tag, value in zip(("lower", "upper"), limits or (-math.inf, math.inf), strict=True):
-            _say(limit, tag, value - zero)
+            _append(limit, tag, value - zero)
         return limit
 
     # Loops, couplings, named frames.
@@ -182,20 +193,21 @@ class _SdfWriter:
                 first, second = second, first
             if joint.limits:
                 raise refusal(self.table.name, f"{joint.name} has limits and closes a loop")
-            _say(SubElement(element, "axis"), "xyz", text_of(opening[:3, :3].T @ first))
-            _say(SubElement(element, "axis2"), "xyz", text_of(second))
+            _append(SubElement(element, "axis"), "xyz", text_of(opening[:3, :3].T @ first))
+            _append(SubElement(element, "axis2"), "xyz", text_of(second))
         else:
             assert isinstance(joint, (Revolute, Prismatic))
             u = np.array(joint.axis, dtype=float)
             axis = SubElement(element, "axis")
-            _say(axis, "xyz", text_of(-u if loop.turned else u))
+            _append(axis, "xyz", text_of(-u if loop.turned else u))
             if joint.limits:
                 forward = inverse(opening) if loop.turned else opening
                 self._limit(axis, joint.limits[0][1], _position(forward, u, kind))
         simbody = SubElement(SubElement(element, "physics"), "simbody")
-        _say(simbody, "must_be_loop_joint", "true")
+        _append(simbody, "must_be_loop_joint", "true")
 
     def _couple(self) -> None:
+        """Append the couplings as mimics of the driven joints, for positions zero as drawn."""
         drawn = self.table.drawn
         for coupling in self.table.couplings:
             offset, factor = (*coupling.coefficients, 0.0, 0.0)[:2]
@@ -205,7 +217,7 @@ class _SdfWriter:
             leader = self.joints[coupling.driver].get("name", "")
             mimic = SubElement(axis, "mimic", joint=leader, axis="axis")
             for tag, value in (("multiplier", factor), ("offset", offset), ("reference", 0.0)):
-                _say(mimic, tag, value)
+                _append(mimic, tag, value)
 
     def _add_frames(self, model: Element) -> None:
         """Append frames for named frames and for the bodies that are not links of the file."""
@@ -226,9 +238,12 @@ class _SdfWriter:
 
 
 def _position(T: Array, axis: Array, kind: str) -> float:
-    """Return the position of a revolute or prismatic joint from the pose T (4, 4) of its frames.
+    """Return the position of a revolute [rad] or prismatic [m] joint.
 
-    axis: unit axis (3,) of the joint.
+    Args:
+        T: (4, 4) pose of the second frame of the joint relative to the first.
+        axis: unit axis (3,) of the joint.
+        kind: "prismatic", or another text for a revolute joint.
     """
     if kind == "prismatic":
         return float(axis @ T[:3, 3])
@@ -237,26 +252,34 @@ def _position(T: Array, axis: Array, kind: str) -> float:
     return math.atan2(float(twice @ axis), float(np.trace(R)) - 1)
 
 
-def _say(element: Element, tag: str, value: Any) -> None:
+def _append(element: Element, tag: str, value: Any) -> None:
+    """Append a child element `tag` with a text or number."""
     SubElement(element, tag).text = value if isinstance(value, str) else repr(float(value) + 0.0)
 
 
 def _pose(element: Element, T: Array, attributes: dict[str, str]) -> None:
+    """Append <pose> of a transform T (4, 4) with XML attributes."""
     pose = SubElement(element, "pose", attributes)
     pose.text = text_of([*T[:3, 3], *angles_of(T[:3, :3])])
 
 
 def _joint(model: Element, name: str, kind: str, parent: str, child: str) -> Element:
+    """Append <joint> with a name and type (`kind`) between a parent and a child link; return it."""
     joint = SubElement(model, "joint", name=name, type=kind)
-    _say(joint, "parent", parent)
-    _say(joint, "child", child)
+    _append(joint, "parent", parent)
+    _append(joint, "child", child)
     return joint
 
 
 def _inertial(link: Element, mass: float, com: Array, tensor: Array) -> None:
+    """Append <inertial> to a link.
+
+    `mass` in [kg], centre of mass `com` (3,) in [m], and inertia `tensor` (3, 3) about it in [kg
+    m^2], all in the link frame.
+    """
     inertial = SubElement(link, "inertial")
-    _say(inertial, "pose", text_of([*com, 0.0, 0.0, 0.0]))
-    _say(inertial, "mass", mass)
+    _append(inertial, "pose", text_of([*com, 0.0, 0.0, 0.0]))
+    _append(inertial, "mass", mass)
     inertia = SubElement(inertial, "inertia")
     for name, at in MOMENTS.items():
-        _say(inertia, name, tensor[at])
+        _append(inertia, name, tensor[at])

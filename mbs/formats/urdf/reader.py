@@ -39,6 +39,7 @@ from mbs.errors import DescriptionError
 from mbs.expressions import plain_numbers
 from mbs.formats.files import Notes, read_bytes
 from mbs.formats.meshes import MeshFiles
+from mbs.formats.rotations import axis_rotation
 from mbs.formats.urdf.shared import MOMENTS, REDUCTION, ROTOR, UNLIMITED
 from mbs.formats.xml import line_of, parse_content
 from mbs.mechanism import Mechanism
@@ -68,11 +69,17 @@ class Reader:
     notes: Notes
 
     def fail(self, message: str) -> NoReturn:
-        """Raise a DescriptionError about the element."""
+        """Raise a DescriptionError with the file, the element and a message."""
         raise DescriptionError(f"{self.where}: {message}")
 
     def note(self, kind: NoteKind, text: str, element: Element | None = None) -> None:
-        """Add a note about the element, or about an element inside it."""
+        """Add a note about the element with its line number.
+
+        Args:
+            kind: kind of the note.
+            text: text of the note.
+            element: element inside it whose line number is given; by default the element itself.
+        """
         line = line_of(self.element if element is None else element)
         self.notes.add(kind, self.what, text, line)
 
@@ -84,13 +91,34 @@ class Reader:
     def number(
         self, element: Element | None, key: str, default: float, largest: float = _LARGEST
     ) -> float:
-        """Return one number of an element, or the default if it is missing."""
+        """Return the number in an attribute of an element, or the default if it is missing.
+
+        Args:
+            element: XML element; None counts as an element without attributes.
+            key: name of the attribute.
+            default: value by default.
+            largest: largest allowed magnitude.
+
+        Raises:
+            DescriptionError: the text is not a number, or the number is too large.
+        """
         return self.vector(element, key, (default,), largest)[0]
 
     def vector(
         self, element: Element | None, key: str, default: Vector, largest: float = _LARGEST
     ) -> Vector:
-        """Return a vector attribute as long as the default, or the default if it is missing."""
+        """Return the numbers in an attribute of an element, or the default if it is missing.
+
+        Args:
+            element: XML element; None counts as an element without attributes.
+            key: name of the attribute.
+            default: values by default, which give the required number of values.
+            largest: largest allowed magnitude.
+
+        Raises:
+            DescriptionError: the attribute has another number of values, or a value is not a number
+                or too large.
+        """
         text = None if element is None else element.get(key)
         if text is None:
             return default
@@ -107,6 +135,10 @@ class Reader:
             text: text in the file.
             count: required number of values.
             largest: largest allowed magnitude.
+
+        Raises:
+            DescriptionError: the text has another number of values, or a value is not a number or
+                too large.
         """
         if "${" in text or "$(" in text:
             self.fail(f"{key} is {quoted(text)}, which xacro has not expanded; {_EXPAND}")
@@ -118,7 +150,10 @@ class Reader:
         return values
 
     def _without_commas(self, element: Element | None, key: str, text: str) -> str:
-        """Replace commas between numbers by blanks, but not commas inside numbers."""
+        """Return a text with blanks in place of commas between numbers; a note reports them.
+
+        Commas inside numbers remain. `key` is the name of the quantity.
+        """
         bare = len(text.split()) == 1 and text.count(",") > 1  # "1,2,3" is three numbers
         spaced = text.replace(",", " ") if bare else _COMMA.sub(" ", text)
         if spaced != text:
@@ -134,7 +169,13 @@ _EXPAND = "load the .xacro file itself, or expand it first"
 
 @dataclass(frozen=True, slots=True)
 class Inertial:
-    """Mass [kg], centre of mass [m] and inertia (3, 3) about it [kg m^2], in the link frame."""
+    """Mass and inertia of a link, expressed in the link frame.
+
+    Attributes:
+        mass: mass [kg].
+        com: centre of mass [m].
+        tensor: inertia (3, 3) about the centre of mass [kg m^2].
+    """
 
     mass: float = 0.0
     com: Vector = (0.0, 0.0, 0.0)
@@ -147,7 +188,19 @@ class Inertial:
 
 
 def origin_of(reader: Reader, element: Element) -> tuple[Vector, list[tuple[str, float]]]:
-    """Return position [m] and rotations about z, y, x [rad] of the <origin> of an element."""
+    """Return the <origin> of an element: position and rotations relative to the parent frame.
+
+    Args:
+        reader: reader of the element or of an enclosing element, for error messages.
+        element: element that contains <origin>.
+
+    Returns:
+        Position (x, y, z) [m], and the nonzero rotations as (axis name, angle [rad]) in the order
+        z, y, x; each rotation is about an axis of the rotated frame.
+
+    Raises:
+        DescriptionError: a number cannot be read.
+    """
     origin = element.find("origin")
     xyz = reader.vector(origin, "xyz", (0.0, 0.0, 0.0))
     roll, pitch, yaw = reader.vector(origin, "rpy", (0.0, 0.0, 0.0))
@@ -156,7 +209,12 @@ def origin_of(reader: Reader, element: Element) -> tuple[Vector, list[tuple[str,
 
 
 def read_inertial(reader: Reader) -> Inertial:
-    """Return the inertial of a link, zero if it has none or no mass.
+    """Return mass and inertia of a link, zero if it has no <inertial> or no mass.
+
+    Missing moments count as 0. A note reports incomplete data.
+
+    Args:
+        reader: reader of the link.
 
     Raises:
         DescriptionError: a number cannot be read.
@@ -175,20 +233,10 @@ def read_inertial(reader: Reader) -> Inertial:
     com, turns = origin_of(reader, inertial)
     tensor = np.array([[Ixx, Ixy, Ixz], [Ixy, Iyy, Iyz], [Ixz, Iyz, Izz]])
     for axis, angle in reversed(turns):
-        R = _turn(axis, angle)
+        R = axis_rotation("xyz".index(axis), angle)
         tensor = np.einsum("ij,jk,lk->il", R, tensor, R)
     tensor = (tensor + tensor.T) / 2
     return Inertial(reader.number(mass, "value", 0.0), com, tensor.tolist())
-
-
-def _turn(axis: str, angle: float) -> Any:
-    k = "xyz".index(axis)
-    c, s = math.cos(angle), math.sin(angle)
-    R = np.eye(3)
-    i, j = (k + 1) % 3, (k + 2) % 3
-    R[i, i] = R[j, j] = c
-    R[i, j], R[j, i] = -s, s
-    return R
 
 
 # Links and joints of a URDF file, and their tree.
@@ -204,7 +252,13 @@ _KINDS = (*_ONE_AXIS, "fixed", "floating", "planar")
 
 @dataclass(frozen=True, slots=True)
 class JointElement:
-    """Joint of a URDF file with the names of its parent and child links."""
+    """Joint of a URDF file.
+
+    Attributes:
+        name: name of the joint, completed or changed if it is missing or used twice.
+        parent, child: names of its parent and child link.
+        element: XML element.
+    """
 
     name: str
     parent: str
@@ -219,7 +273,14 @@ class JointElement:
 
 @dataclass(frozen=True, slots=True)
 class UrdfTree:
-    """Links by name, and joints in an order in which parents precede children."""
+    """Links and joints of a URDF file, which form a tree.
+
+    Attributes:
+        notes: notes of the file.
+        root: name of the root link.
+        links: XML elements of the links, by name.
+        joints: joints in an order in which parents precede children.
+    """
 
     notes: Notes
     root: str
@@ -227,7 +288,11 @@ class UrdfTree:
     joints: tuple[JointElement, ...]
 
     def link(self, name: str) -> Reader:
-        """Return a reader of the numbers of a link."""
+        """Return a reader of the numbers of a link.
+
+        Args:
+            name: name of the link in the file.
+        """
         return Reader(f"link {quoted(name)}", self.links[name], self.notes)
 
     def joint(self, joint: JointElement) -> Reader:
@@ -237,6 +302,10 @@ class UrdfTree:
 
 def read_tree(root: Element, notes: Notes) -> UrdfTree:
     """Return the links and joints of a <robot>, after a check that they form a tree.
+
+    Args:
+        root: XML element <robot>.
+        notes: notes of the file.
 
     Raises:
         DescriptionError: a joint refers to an unknown link, two different links have the same name,
@@ -266,6 +335,10 @@ def read_tree(root: Element, notes: Notes) -> UrdfTree:
 
 
 def _links(root: Element, notes: Notes) -> dict[str, Element]:
+    """Return the <link> elements by name; repeated and unnamed links are left out with a note.
+
+    Raise a DescriptionError if there is no link, or two different links have the same name.
+    """
     links: dict[str, Element] = {}
     texts = _Texts()
     for element in root.findall("link"):
@@ -292,6 +365,7 @@ def _links(root: Element, notes: Notes) -> dict[str, Element]:
 
 
 def _joints(root: Element, notes: Notes) -> dict[str, Element]:
+    """Return the <joint> elements by name; missing and repeated names are changed with a note."""
     joints: dict[str, Element] = {}
     count: dict[str, int] = {}
     texts = _Texts()
@@ -324,7 +398,7 @@ def _joints(root: Element, notes: Notes) -> dict[str, Element]:
 
 
 class _Texts(dict[Element, str]):
-    """Cache of the XML texts of elements."""
+    """Cache of the XML texts of elements, by element."""
 
     def same(self, one: Element, other: Element) -> bool:
         """Whether two elements have the same content, apart from white space."""
@@ -333,12 +407,14 @@ class _Texts(dict[Element, str]):
         return self[one] == self._text(other)
 
     def _text(self, element: Element) -> str:
+        """Return the XML text of an element with single blanks as white space."""
         return " ".join(tostring(element, encoding="unicode").split())
 
 
 def _joint_element(
     notes: Notes, name: str, element: Element, links: Collection[str]
 ) -> JointElement:
+    """Return a joint with its links; raise a DescriptionError if a link does not exist."""
     ends = []
     for side in ("parent", "child"):
         end = element.find(side)
@@ -355,6 +431,10 @@ def _joint_element(
 def _order(
     path: str, root: str, links: Iterable[str], joints: Iterable[JointElement]
 ) -> tuple[JointElement, ...]:
+    """Return the joints, parents before children; raise a DescriptionError if there is a cycle.
+
+    `root` is the name of the root link, `path` the file for error messages.
+    """
     children: dict[str, list[JointElement]] = {name: [] for name in links}
     for joint in joints:
         children[joint.parent].append(joint)
@@ -378,7 +458,7 @@ def _order(
 
 
 @dataclass(slots=True)
-class KeptNames:
+class UniqueNames:
     """Assign a unique name to every element: the name in the file, changed if it is not allowed.
 
     Attributes:
@@ -391,14 +471,17 @@ class KeptNames:
     wanted: set[str]
     number: dict[str, int] = field(default_factory=dict)
 
-    def give(self, reader: Reader, text: str, suffix: str, why: str) -> str:
-        """Return a name for an element, and mark it as assigned.
+    def assign(self, reader: Reader, text: str, suffix: str, why: str) -> str:
+        """Return the component name of an element, and mark it as assigned.
+
+        It is the name in the file with invalid characters replaced. If that is assigned already, a
+        suffix and a number are appended. A note reports each change.
 
         Args:
-            reader: reader of the element.
+            reader: reader of the element, which receives the note.
             text: name of the element in the file.
-            suffix: suffix that is appended if the name is not allowed.
-            why: reason why it is not allowed, for the note.
+            suffix: suffix, and name of elements without a usable name.
+            why: reason why the name is not free, for the note.
         """
         name = component_name(text) or suffix
         if name not in self.taken:
@@ -416,21 +499,32 @@ class KeptNames:
 
 
 @dataclass(frozen=True, slots=True)
-class Named:
-    """Component names of links, moving joints and the free root joint, by name in the file."""
+class ElementNames:
+    """Component names of links, moving joints and the free root joint.
+
+    Attributes:
+        links: component name by name of the link in the file.
+        joints: component name by name of the joint in the file, without fixed joints.
+        free: name of the joint of a free base.
+    """
 
     links: Mapping[str, str]
     joints: Mapping[str, str]
     free: str
 
 
-def element_names(tree: UrdfTree, base: Base | None) -> Named:
-    """Return the names of the elements in the mechanism, with a note for each change."""
+def element_names(tree: UrdfTree, base: Base | None) -> ElementNames:
+    """Return the component names of links and joints, with a note for each changed name.
+
+    Args:
+        tree: links and joints of the file.
+        base: "free" if the root gets a free joint, otherwise None.
+    """
     moving = [joint for joint in tree.joints if joint.kind != "fixed"]
     wanted = {component_name(name) for name in (*tree.links, *(j.name for j in moving))}
-    names = KeptNames({"world"}, wanted)
+    names = UniqueNames({"world"}, wanted)
     of_joint = {
-        joint.name: names.give(
+        joint.name: names.assign(
             tree.joint(joint),
             joint.name,
             "joint",
@@ -440,7 +534,7 @@ def element_names(tree: UrdfTree, base: Base | None) -> Named:
     }
     free = FREE_JOINT
     if base == "free":
-        free = names.give(
+        free = names.assign(
             tree.link(tree.root),
             FREE_JOINT,
             "free",
@@ -460,12 +554,16 @@ def element_names(tree: UrdfTree, base: Base | None) -> Named:
             if reserved
             else "a joint, another link or the world has this name"
         )
-        of_link[link] = names.give(tree.link(link), link, "link", why)
-    return Named(of_link, of_joint, free)
+        of_link[link] = names.assign(tree.link(link), link, "link", why)
+    return ElementNames(of_link, of_joint, free)
 
 
-def _floats(tree: UrdfTree) -> bool:
-    """Whether root and links fixed to it have no inertial, and a floating joint starts there."""
+def _has_floating_base(tree: UrdfTree) -> bool:
+    """Whether the file itself has a floating base.
+
+    This is so if the root and all links fixed to it have no inertial and a floating joint starts
+    there.
+    """
     held = {tree.root}
     for joint in tree.joints:
         if joint.parent in held and joint.kind == "fixed":
@@ -475,7 +573,7 @@ def _floats(tree: UrdfTree) -> bool:
 
 
 def _at_world(tree: UrdfTree) -> set[str]:
-    """Return the links whose frame coincides with the world frame, if the root is fixed to it."""
+    """Return the links whose frame coincides with the root frame by fixed joints without offset."""
     found = {tree.root}
     for joint in tree.joints:
         if joint.kind == "fixed" and joint.parent in found:
@@ -511,6 +609,9 @@ def read_urdf(
         packages: folders of the packages in a xacro file or in `package://` names.
         other_files: whether to read the mesh files; set to False for files from untrusted sources.
 
+    Returns:
+        The mechanism. Its `notes` list ignored, changed and completed elements.
+
     Raises:
         DescriptionError: the file is missing or malformed, or its links and joints do not form a
             tree. In strict mode, also for each note.
@@ -526,21 +627,33 @@ def read_urdf(
         )
     _note_unread(root, notes)
     tree = read_tree(root, notes)
-    text = root.get("name") or ""
-    name = component_name(text)
-    if not name:
-        name = component_name(Path(path).stem) or "robot"
-        notes.add("completed", "<robot>", f"it has no name; named {quoted(name)}", line_of(root))
+    name = robot_name(root, notes)
     mechanism = Mechanism(name, source=f"URDF file {Path(path).name}")
     mechanism.notes = notes.taken
-    base = "free" if base == "free" and not _floats(tree) else None
-    building = _Building(mechanism, tree, element_names(tree, base), _rotors(root, tree))
+    base = "free" if base == "free" and not _has_floating_base(tree) else None
+    building = _UrdfBuilder(mechanism, tree, element_names(tree, base), _rotors(root, tree))
     building.build(base)
     folder = Path(path).resolve().parent if other_files else None
     meshes = MeshFiles(folder, dict(packages or {}))
     add_shapes(mechanism, tree, building.points, material_colours(root), meshes)
     meshes.note(notes)
     return mechanism
+
+
+def robot_name(element: Element, notes: Notes) -> str:
+    """Return the component name of a robot: its attribute `name`, or else the file name.
+
+    Args:
+        element: XML element of the robot.
+        notes: notes of the file, which receive a note if the element has no name.
+    """
+    name = component_name(element.get("name") or "")
+    if name:
+        return name
+    name = component_name(Path(notes.path).stem) or "robot"
+    text = f"it has no name; named {quoted(name)}"
+    notes.add("completed", f"<{element.tag}>", text, line_of(element))
+    return name
 
 
 def expanded(
@@ -603,7 +716,7 @@ _WITH_EFFECT = {"springStiffness", "springReference", "turnGravityOff", "kinemat
 
 
 def _note_unread(root: Element, notes: Notes) -> None:
-    """Add one note for each kind of element that is not read."""
+    """Add one note for each kind of element of a <robot> that is not read."""
     unread: dict[tuple[str, str], list[Element]] = {}
     for parent in (root, *root.findall("link"), *root.findall("joint")):
         for child in parent:
@@ -620,7 +733,7 @@ def _note_unread(root: Element, notes: Notes) -> None:
 
 
 def _note_effects(root: Element, notes: Notes) -> None:
-    """Add notes about unread elements that would change the motion, such as loops and springs."""
+    """Add notes about unread elements of a <robot> that would change the motion, such as loops."""
     for element in root:
         local = element.tag.rpartition(":")[2]
         if local in _LOOPS:
@@ -644,6 +757,7 @@ def _effects(gazebo: Element) -> Iterator[Element]:
 
 
 def _is_zero(text: str) -> bool:
+    """Whether a text is the number zero; False if it is not a number."""
     try:
         return float(text) == 0
     except ValueError:
@@ -654,7 +768,10 @@ def _rotors(root: Element, tree: UrdfTree) -> dict[str, float]:
     """Return the rotor inertias of transmissions, referred to their joints, Ia [kg m^2 or kg].
 
     A rotor inertia J with reduction n is n^2 J at the joint. A reduction without rotor inertia has
-    no effect, since the inputs of the models are joint efforts.
+    no effect, since the inputs of the models are joint efforts. `root` is the <robot> element.
+
+    Returns:
+        Rotor inertia by joint name in the file.
     """
     found: dict[str, float] = {}
     # the format has no other element for the armature of free joints
@@ -676,7 +793,10 @@ def _rotors(root: Element, tree: UrdfTree) -> dict[str, float]:
 
 
 def _scalar_in(element: Element, tags: Collection[str]) -> float | None:
-    """Return the first number in elements with these names, with any prefix."""
+    """Return the first finite number in a descendant element with one of the names `tags`.
+
+    Prefixes of names are ignored. None if there is no such number.
+    """
     for inner in element.iter():
         if inner.tag.rpartition(":")[2] in tags:
             try:
@@ -692,7 +812,7 @@ def _scalar_in(element: Element, tags: Collection[str]) -> float | None:
 
 
 @dataclass(slots=True)
-class _Building:
+class _UrdfBuilder:
     """Builder of a mechanism from the links and joints of a tree.
 
     Attributes:
@@ -700,20 +820,24 @@ class _Building:
         tree: tree of the file.
         names: names of the elements in the mechanism.
         rotors: rotor inertia Ia by joint name in the file.
-        inertials: inertial of each link.
+        inertials: mass and inertia of each link.
         leaders: for each mimic joint, the joint that it follows.
-        points: frame of each link.
+        points: frame of each link in the mechanism.
     """
 
     mechanism: Mechanism
     tree: UrdfTree
-    names: Named
+    names: ElementNames
     rotors: Mapping[str, float]
     inertials: dict[str, Inertial] = field(default_factory=dict)
     leaders: dict[str, str] = field(default_factory=dict)
     points: dict[str, Point] = field(default_factory=dict)
 
     def build(self, base: Base | None) -> None:
+        """Add all bodies, joints and couplings to the mechanism; `base` is "free" or None (fixed).
+
+        Raise a DescriptionError if a number or joint type of the file is invalid.
+        """
         tree = self.tree
         for link in tree.links:
             self.inertials[link] = read_inertial(tree.link(link))
@@ -726,6 +850,10 @@ class _Building:
         self._add_mimics()
 
     def _root(self, base: Base | None) -> Point:
+        """Add the root link and connect it to the world; return its frame.
+
+        A fixed root that is named "world" or has no mass is the world itself.
+        """
         mechanism, link = self.mechanism, self.tree.root
         world, name = mechanism.world.frame, self.names.links[link]
         if base == "free":
@@ -741,10 +869,15 @@ class _Building:
         return world
 
     def _body(self, link: str) -> Body:
+        """Return the body of a link with its inertia."""
         inertial = self.tree.links[link].find("inertial")
         return body_of(self.tree.link(link), self.names.links[link], self.inertials[link], inertial)
 
     def _add(self, joint: JointElement, parent: Point) -> Point:
+        """Add a joint and its child link; return the frame of the child.
+
+        `parent` is the frame of the parent link. Raise a DescriptionError for an unknown type.
+        """
         body = self.mechanism.add(self._body(joint.child))
         reader = self.tree.joint(joint)
         xyz, turns = origin_of(reader, joint.element)
@@ -758,9 +891,16 @@ class _Building:
         return body.frame
 
     def _joint(self, reader: Reader, joint: JointElement) -> Joint:
+        """Return a moving joint as a component with axis, limits, friction and rotor inertia.
+
+        Raise a DescriptionError if its axis has zero length.
+        """
         name, kind = self.names.joints[joint.name], joint.kind
         dynamics = joint.element.find("dynamics")
-        Fv, Fs = (_friction(reader, dynamics, key) for key in ("damping", "friction"))
+        Fv, Fs = (
+            not_negative(reader, dynamics, key, reader.number(dynamics, key, 0.0))
+            for key in ("damping", "friction")
+        )
         if kind == "floating":
             return Free(name, actuated=False, Fv=Fv, Fs=Fs, Ia=self.rotors.get(joint.name, 0.0))
         axis = reader.vector(joint.element.find("axis"), "xyz", (1.0, 0.0, 0.0))
@@ -794,6 +934,7 @@ class _Building:
             tree.link(tree.root).note("doubted", "nothing of the free robot has inertia")
 
     def _add_mimics(self) -> None:
+        """Add the mimics as couplings: position = offset + multiplier times leading position."""
         taken = {*self.mechanism.components, *self.mechanism.frames}
         for joint in self.tree.joints:
             mimic = joint.element.find("mimic")
@@ -832,7 +973,7 @@ def body_of(reader: Reader, name: str, inertial: Inertial, element: Element | No
 
 
 def _leaders(tree: UrdfTree) -> dict[str, str]:
-    """Return the joint that each mimic joint follows, with notes about invalid mimics."""
+    """Return the name of the joint that each mimic joint follows; a note reports invalid mimics."""
     found: dict[str, str] = {}
     last: dict[str, str] = {}
     kinds = {joint.name: joint.kind for joint in tree.joints}
@@ -874,11 +1015,18 @@ def _mimic_fault(
     return "which follows it" if leader == joint.name else ""
 
 
-def _friction(reader: Reader, dynamics: Element | None, key: str) -> float:
-    value = reader.number(dynamics, key, 0.0)
+def not_negative(reader: Reader, element: Element | None, key: str, value: float) -> float:
+    """Return a value, or 0 with a note if it is negative.
+
+    Args:
+        reader: reader of the joint, which receives the note.
+        element: XML element of the value, for the note.
+        key: name of the value.
+        value: number in the file.
+    """
     if value >= 0:
         return value
-    reader.note("ignored", f"{key} is {value:g}, less than zero; taken as 0", dynamics)
+    reader.note("ignored", f"{key} is {value:g}, less than zero; taken as 0", element)
     return 0.0
 
 
@@ -886,7 +1034,10 @@ _INFINITE = {"inf": math.inf, "infinity": math.inf, "nan": math.nan}
 
 
 def _limit(reader: Reader, limit: Element | None, key: str) -> float:
-    """Return a number of a <limit>, which may be infinite or NaN."""
+    """Return the number in the attribute `key` of a <limit>, which may be infinite or NaN.
+
+    Zero if it is missing.
+    """
     text = ("" if limit is None else limit.get(key, "")).strip().lower()
     if text.lstrip("+-") in _INFINITE:
         return _INFINITE[text.lstrip("+-")] * (-1 if text.startswith("-") else 1)
@@ -895,23 +1046,44 @@ def _limit(reader: Reader, limit: Element | None, key: str) -> float:
 
 
 def _limits(reader: Reader) -> tuple[float, float] | None:
+    """Return the position limits (lower, upper) of a joint from its <limit> element.
+
+    None, with a note, without this element. None unless both are finite and ordered; see
+    `limits_of`.
+    """
     limit = reader.element.find("limit")
     if limit is None:
         reader.note("completed", "it has no <limit>; taken as unlimited")
         return None
-    low, high = (_limit(reader, limit, key) for key in ("lower", "upper"))
+    return limits_of(reader, limit, *(_limit(reader, limit, key) for key in ("lower", "upper")))
+
+
+def limits_of(
+    reader: Reader, limit: Element | None, low: float, high: float
+) -> tuple[float, float] | None:
+    """Return position limits, or None for limits that are not both finite and ordered.
+
+    Args:
+        reader: reader of the joint, which receives a note if limits are given but not usable.
+        limit: XML element of the limits, for the note.
+        low: lower limit, minus infinity if there is none [rad or m].
+        high: upper limit, infinity if there is none [rad or m].
+    """
     if low < high and math.isfinite(low) and math.isfinite(high):
         return low, high
     if (low, high) != (-math.inf, math.inf):
-        text = f"its limits ({low:g}, {high:g}) leave it no range; taken as unlimited"
-        if low < high:
-            text = f"its limits ({low:g}, {high:g}) have one end; taken as unlimited"
+        how = "have one end" if low < high else "leave it no range"
+        text = f"its limits ({low:g}, {high:g}) {how}; taken as unlimited"
         reader.note("doubted", text, limit)
     return None
 
 
 def _largest(reader: Reader, key: str) -> float | None:
-    """Return the velocity or effort limit, or None; files contain zero if it is unknown."""
+    """Return the limit of the magnitude of velocity or effort (`key`), None if it is unlimited.
+
+    Zero counts as unlimited, since files contain zero if the limit is unknown. A note reports
+    negative values and NaN.
+    """
     limit = reader.element.find("limit")
     value = _limit(reader, limit, key)
     if value < 0 or math.isnan(value):
@@ -929,7 +1101,13 @@ _PRIMITIVES = {"box": ("size",), "sphere": ("radius",)} | dict.fromkeys(
 
 
 def material_colours(root: Element) -> dict[str, Vector]:
-    """Return (red, green, blue, opacity) of materials by name, by the first definition."""
+    """Return the colours (red, green, blue, opacity) of materials, each between 0 and 1, by name.
+
+    The first definition of a name counts.
+
+    Args:
+        root: XML element <robot>.
+    """
     found: dict[str, Vector] = {}
     own = (m for tag in ("visual", "collision") for v in root.iter(tag) for m in v.iter("material"))
     for material in (*root.findall("material"), *own):
@@ -940,7 +1118,10 @@ def material_colours(root: Element) -> dict[str, Vector]:
 
 
 def _rgba(material: Element) -> Vector | None:
-    """Return the colour in a material element, or None."""
+    """Return the colour (red, green, blue, opacity) in a <material>.
+
+    None if it has no valid one.
+    """
     colour = material.find("color")
     text = "" if colour is None else colour.get("rgba", "")
     try:
@@ -964,8 +1145,8 @@ def add_shapes(
     Args:
         mechanism: mechanism that receives the shapes.
         tree: tree of the file.
-        points: frames of the links.
-        colours: colours of materials by name.
+        points: frames of the links, by name.
+        colours: colours of materials by name; see `material_colours`.
         meshes: search for the mesh files.
     """
     seen = any(element.find("visual") is not None for element in tree.links.values())
@@ -987,7 +1168,11 @@ def add_shapes(
 def _shape(
     reader: Reader, frame: Point, colours: Mapping[str, Vector], meshes: MeshFiles
 ) -> tuple[Point, Shape] | None:
-    """Return the frame and the shape of a visual or collision; None if it cannot be drawn."""
+    """Return a visual or collision of a link as (frame, shape); None if it cannot be drawn.
+
+    `frame` is that of the link, `colours` are those of materials by name, `meshes` searches mesh
+    files.
+    """
     element = reader.element
     colour = None
     material = element.find("material")

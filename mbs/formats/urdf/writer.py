@@ -40,7 +40,7 @@ def write_urdf(table: LinkTable, path: str | os.PathLike[str], note: str = "") -
 
 
 def _axis_name(table: LinkTable, link: FileLink) -> str:
-    """Return an unused name for a link whose frame is that in the tree."""
+    """Return an unused name for a link that has no body and so uses the joint frame of the tree."""
     name = f"{link.name}_axis"
     while name in table.frames:
         name += "_"
@@ -48,7 +48,7 @@ def _axis_name(table: LinkTable, link: FileLink) -> str:
 
 
 def _add_link(root: Element, table: LinkTable, link: FileLink, parent: str, name: str) -> None:
-    """Append a link, its joint and the transmission with the rotor of the joint."""
+    """Append the link `name`, the joint to its parent link, and the transmission with its rotor."""
     _inertial(SubElement(root, "link", name=name), *inertial_of(table, link))
     kind = {Motion.FREE: "floating", Motion.PRISMATIC: "prismatic"}.get(link.motion, "revolute")
     velocity, effort = largest_of(table, link, "URDF", UNLIMITED)
@@ -82,6 +82,7 @@ def _transmission(root: Element, link: FileLink) -> None:
 
 
 def _mimic(joint: Element, table: LinkTable, link: FileLink) -> None:
+    """Append <mimic> to a joint if a linear coupling drives it."""
     for coupling in table.couplings:
         if coupling.driven == link.position:
             offset, factor = (*coupling.coefficients, 0.0, 0.0)[:2]
@@ -95,7 +96,7 @@ def _mimic(joint: Element, table: LinkTable, link: FileLink) -> None:
 
 
 def _add_fixed_joint(root: Element, frame: FileFrame, parent: str) -> None:
-    """Append a link with a fixed joint for a body or named frame."""
+    """Append a massless link for a body or named frame, fixed to the link `parent`."""
     SubElement(root, "link", name=frame.name)
     joint = SubElement(root, "joint", name=f"{frame.name}_fixed", type="fixed")
     SubElement(joint, "parent", link=parent)
@@ -104,10 +105,15 @@ def _add_fixed_joint(root: Element, frame: FileFrame, parent: str) -> None:
 
 
 def _origin(element: Element, pose: Array) -> None:
+    """Append <origin> with the position and the roll-pitch-yaw angles of a pose (4, 4)."""
     SubElement(element, "origin", xyz=text_of(pose[:3, 3]), rpy=text_of(angles_of(pose[:3, :3])))
 
 
 def _inertial(link: Element, mass: float, com: Array, tensor: Array) -> None:
+    """Append <inertial>, unless it is zero: mass [kg], centre of mass (3,) [m] and inertia.
+
+    `tensor` is the inertia (3, 3) about the centre of mass [kg m^2].
+    """
     if mass == 0 and not np.any(tensor):
         return
     inertial = SubElement(link, "inertial")

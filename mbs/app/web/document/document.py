@@ -21,7 +21,6 @@ from mbs.app.web.document.tables import (
     Cell,
     CellProblem,
     Tables,
-    Texts,
     mount,
     number,
     place_of,
@@ -48,8 +47,12 @@ _WORD = re.compile(r"[A-Za-z_]+")
 _ALIASES = {"sigma": "joint", "cut": "frame", "motor": "actuated"}
 
 
-def unread(tables: Tables) -> Iterator[CellProblem]:
-    """Yield a problem for every cell whose text cannot be read."""
+def cell_problems(tables: Tables) -> Iterator[CellProblem]:
+    """Yield a problem for every cell whose text cannot be read.
+
+    Args:
+        tables: cells of a robot.
+    """
     for cell, text in tables.cells():
         try:
             reader_of(*cell)(text, place_of(*cell))
@@ -57,8 +60,15 @@ def unread(tables: Tables) -> Iterator[CellProblem]:
             yield CellProblem(*cell, str(error))
 
 
-def placed(tables: Tables, error: MbsError) -> CellProblem:
-    """Return the cell that an error is about, as far as the error message identifies it."""
+def problem_of(tables: Tables, error: MbsError) -> CellProblem:
+    """Return an error of a robot as a problem of the cell that its message names.
+
+    The problem is that of the robot as a whole if the message names no cell.
+
+    Args:
+        tables: cells of the robot.
+        error: error of its assembly.
+    """
     sentence = str(error)
     return (
         _by_number(tables, sentence)
@@ -69,6 +79,10 @@ def placed(tables: Tables, error: MbsError) -> CellProblem:
 
 
 def _by_number(tables: Tables, sentence: str) -> CellProblem | None:
+    """Return the problem of the row that a message names by number, such as "frame 3".
+
+    Else None.
+    """
     found = _ROW.search(sentence)
     if found is None:
         return None
@@ -79,11 +93,15 @@ def _by_number(tables: Tables, sentence: str) -> CellProblem | None:
 
 
 def _by_name(tables: Tables, sentence: str) -> CellProblem | None:
-    """Find the row whose joint or body name the error message quotes or begins with.
+    """Return the problem of the row whose joint or body name a message quotes or begins with.
 
-    If several rows match, a row that the user named is preferred, then the last row.
+    If several rows match, a row that the user named is preferred, then the last row. None if no row
+    matches.
     """
-    by_hand = [bool(g[-1].strip() or b[-1].strip()) for g, b in _pairs(tables)]
+    by_hand = [
+        bool(g[-1].strip() or b[-1].strip())
+        for g, b in zip(tables.geometry, tables.inertia, strict=True)
+    ]
     for row in sorted(range(len(by_hand)), key=lambda k: (by_hand[k], k), reverse=True):
         joint, body = tables.joint_name(row), tables.body_name(row)
         if _is_about(sentence, body):
@@ -99,11 +117,8 @@ def _by_name(tables: Tables, sentence: str) -> CellProblem | None:
     return None
 
 
-def _pairs(tables: Tables) -> zip[tuple[Texts, Texts]]:
-    return zip(tables.geometry, tables.inertia, strict=True)
-
-
 def _by_symbol(tables: Tables, sentence: str) -> CellProblem | None:
+    """Return the problem of the symbol that a message names; else None."""
     for k, name in enumerate(tables.symbols):
         if re.search(rf"\bparameter '?{re.escape(name)}'?(?![\w.])", sentence):
             return CellProblem("symbols", k, "value", sentence)
@@ -111,15 +126,20 @@ def _by_symbol(tables: Tables, sentence: str) -> CellProblem | None:
 
 
 def _is_about(sentence: str, name: str) -> bool:
+    """Whether a message begins with a name or quotes it."""
     return sentence.startswith((f"{name}:", f"{name},")) or f"'{name}'" in sentence
 
 
 def _after(sentence: str, name: str) -> str:
+    """Return the part of a message after a name."""
     return sentence.partition(name)[2]
 
 
 def _column(sheet: str, words: str) -> str:
-    """Return the first word that is the name of a column; empty if there is none."""
+    """Return the first word of a text that is a column of the table `sheet`.
+
+    Empty if there is none.
+    """
     columns: Any = COLUMNS[sheet]
     for word in _WORD.findall(words):
         if (known := _ALIASES.get(word, word)) in columns:
@@ -139,7 +159,7 @@ class DocumentOrigin:
     Attributes:
         name: name in the catalogue, or "" for a file.
         content: content of the file.
-        suffix: suffix of the file name.
+        suffix: suffix of the file name, such as ".urdf".
         reason: reason why a table of frames cannot express it.
     """
 
@@ -149,7 +169,10 @@ class DocumentOrigin:
     reason: str = ""
 
     def mechanism(self) -> Mechanism:
-        """Build the mechanism from its source."""
+        """Return the mechanism, built from its source.
+
+        Raise a DescriptionError if the file is invalid.
+        """
         if self.name:
             return catalogue()[self.name]()
         made = read_upload(self.content, self.suffix)
@@ -171,7 +194,11 @@ class Document:
 
     @staticmethod
     def of(table: RobotTable) -> Document:
-        """Return the document of a table of frames."""
+        """Return the document of a table of frames.
+
+        Args:
+            table: table of frames.
+        """
         return Document(tables_of(table))
 
     @staticmethod
@@ -182,6 +209,9 @@ class Document:
     @staticmethod
     def of_name(name: str) -> Document:
         """Return the document of a mechanism of the catalogue.
+
+        Args:
+            name: name in the catalogue.
 
         Raises:
             DescriptionError: the catalogue has no robot with this name.
@@ -195,6 +225,10 @@ class Document:
     @staticmethod
     def of_upload(content: bytes, suffix: str) -> Document:
         """Return the document of a robot file: .toml, .par, .urdf, .sdf, .world or .xml (MJCF).
+
+        Args:
+            content: content of the file.
+            suffix: suffix of the file name.
 
         Raises:
             DescriptionError: the file is too large, of another type, or malformed.
@@ -224,6 +258,10 @@ class Document:
     def changed(self, cell: Cell, text: str) -> Document:
         """Return the document with another text in a cell.
 
+        Args:
+            cell: position of the cell.
+            text: new text.
+
         Raises:
             DescriptionError: the cell does not exist, or cannot be changed.
         """
@@ -239,19 +277,41 @@ class Document:
         return replace(self, tables=self.tables.changed(cell, text[: LONGEST_CELL + 1]))
 
     def with_frame(self) -> Document:
-        """Return the document with an additional frame at the end."""
+        """Return the document with an additional frame at the end.
+
+        Raises:
+            DescriptionError: rows of this robot cannot be changed, or the table is full.
+        """
         return self._edit(document_rows.with_frame)
 
     def without_frame(self, row: int) -> Document:
-        """Return the document without frame row + 1; the numbers of later frames decrease."""
+        """Return the document without a frame; the numbers of later frames decrease by one.
+
+        Args:
+            row: row index of the frame (its number minus one).
+
+        Raises:
+            DescriptionError: rows of this robot cannot be changed, or it is the only frame.
+        """
         return self._edit(lambda tables: document_rows.without_frame(tables, row))
 
     def with_loop(self) -> Document:
-        """Return the document with an additional loop."""
+        """Return the document with an additional loop.
+
+        Raises:
+            DescriptionError: rows of this robot cannot be changed.
+        """
         return self._edit(document_rows.with_loop)
 
     def without_loop(self, row: int) -> Document:
-        """Return the document without loop row + 1."""
+        """Return the document without a loop.
+
+        Args:
+            row: row index of the loop, from 0.
+
+        Raises:
+            DescriptionError: rows of this robot cannot be changed, or there is no such loop.
+        """
         return self._edit(lambda tables: document_rows.without_loop(tables, row))
 
     @property
@@ -265,7 +325,9 @@ class Document:
         return _UNSAFE.sub("_", self.name)[:60].strip("_") or "robot"
 
     def as_table(self) -> Document:
-        """Convert the links of an assembled mechanism to a table of frames.
+        """Return the document as a table of frames, made from the links of the assembled mechanism.
+
+        A document that is a table already is returned unchanged.
 
         Raises:
             MbsError: a table of frames cannot express it, or it cannot be assembled.
@@ -349,11 +411,16 @@ class Document:
         return self._write(write_par, "robot.par")
 
     def _edit(self, edit: Callable[[Tables], Tables]) -> Document:
+        """Return the document with changed tables.
+
+        Raise a DescriptionError if rows cannot be changed.
+        """
         if self.origin is not None:
             raise DescriptionError(f"rows cannot be changed: {self.origin.reason}")
         return replace(self, tables=edit(self.tables))
 
     def _write(self, write: Callable[[RobotTable, Path], None], name: str) -> str:
+        """Return the text that the callable `write` writes to a file with this name."""
         table = self.table()
         with tempfile.TemporaryDirectory(prefix="mbs-app-") as folder:
             path = Path(folder) / name
@@ -362,6 +429,7 @@ class Document:
 
 
 def _of_mechanism(mechanism: Mechanism, origin: DocumentOrigin) -> Document:
+    """Return the document of a mechanism: a table of frames if possible, else with its origin."""
     try:
         return Document.of(table_of(mechanism))
     except DescriptionError as error:
@@ -376,34 +444,39 @@ def _of_mechanism(mechanism: Mechanism, origin: DocumentOrigin) -> Document:
 
 @lru_cache(maxsize=_KEPT)
 def _table(document: Document) -> RobotTable:
+    """Return the table of frames of a document (cached)."""
     return robot_table(document.tables)
 
 
 @lru_cache(maxsize=_KEPT)
 def _system(document: Document) -> System:
+    """Return the assembled system of a document (cached)."""
     return document.mechanism().assemble()
 
 
 @lru_cache(maxsize=_KEPT)
 def _shown(document: Document) -> Tables:
+    """Return the tables that show the links of an assembled document (cached)."""
     return shown_tables(document.system(), document.tables)
 
 
 @lru_cache(maxsize=_KEPT)
 def _problems(document: Document) -> tuple[CellProblem, ...]:
+    """Return the problems of the cells of a document (cached)."""
     if document.origin is not None:
         return tuple(_value_problems(document))
-    found = tuple(unread(document.tables))
+    found = tuple(cell_problems(document.tables))
     if found:
         return found
     try:
         document.mechanism()
     except MbsError as error:
-        return (placed(document.tables, error),)
+        return (problem_of(document.tables, error),)
     return ()
 
 
 def _value_problems(document: Document) -> list[CellProblem]:
+    """Return the problems of symbols, gravity and mount of a document that has an origin."""
     problems = []
     for row, (name, text) in enumerate(document.tables.values):
         try:

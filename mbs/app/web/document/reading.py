@@ -71,6 +71,7 @@ def close_mjcf(path: Path) -> None:
 
 
 def _check(path: Path, element: Element) -> None:
+    """Raise a DescriptionError if an element refers to files at other locations."""
     for name, value in element.attrib.items():
         is_path = name.startswith("file") or name.endswith("dir")
         if is_path and (element.tag in _PARTS or not _is_inside(value)):
@@ -81,7 +82,7 @@ def _check(path: Path, element: Element) -> None:
 
 
 def _is_inside(value: str) -> bool:
-    """Return whether a path stays in the folder of the file."""
+    """Whether a path is relative and stays in the folder of the file."""
     plain = value.replace("\\", "/")
     return not plain.startswith("/") and ":" not in plain and ".." not in plain.split("/")
 
@@ -138,6 +139,9 @@ def read_upload(content: bytes, suffix: str) -> RobotTable | Mechanism:
 def table_of(mechanism: Mechanism) -> RobotTable:
     """Return the table of frames from which a mechanism was made.
 
+    Args:
+        mechanism: mechanism before its assembly.
+
     Raises:
         DescriptionError: the mechanism was made in another way; the message names the part that a
             table cannot express.
@@ -154,6 +158,7 @@ def table_of(mechanism: Mechanism) -> RobotTable:
 
 
 def _require_plain(mechanism: Mechanism) -> None:
+    """Raise a DescriptionError if a mechanism has a component or frame that no table expresses."""
     for component in mechanism.components.values():
         if component is mechanism.world or isinstance(component, KhalilBody):
             continue
@@ -177,13 +182,16 @@ def _require_plain(mechanism: Mechanism) -> None:
 
 
 def _table(mechanism: Mechanism) -> RobotTable:
-    """Return the table of frames: rows in the order of the bodies, cut joints last."""
+    """Return the table of frames of a mechanism.
+
+    Rows are in the order of the bodies; cut joints are last.
+    """
     bodies = [body for body in mechanism.bodies() if isinstance(body, KhalilBody)]
     numbers = {mechanism.world.name: 0, **{body.name: j for j, body in enumerate(bodies, 1)}}
     placed: dict[str, tuple[Point, Joint | None]] = {}
     cuts: dict[str, list[Point]] = {name: [] for name in mechanism.cuts}
     for a, b in mechanism.connections:
-        _sort(a, b, placed, cuts)
+        _record_connection(a, b, placed, cuts)
     frames = [_frame(j, *placed[body.name], numbers) for j, body in enumerate(bodies, 1)]
     rows = [_body(j, body, placed[body.name][1]) for j, body in enumerate(bodies, 1)]
     first, B = len(frames) + 1, len(cuts)
@@ -213,13 +221,17 @@ def _table(mechanism: Mechanism) -> RobotTable:
     )
 
 
-def _sort(
+def _record_connection(
     a: Point,
     b: Point,
     placed: dict[str, tuple[Point, Joint | None]],
     cuts: dict[str, list[Point]],
 ) -> None:
-    """Assign a connection to its body, to the joint before a body, or to a cut joint."""
+    """Record a connection of the points a and b in `placed` or `cuts`, which are changed.
+
+    `placed` gives for each body the point and the joint before it, `cuts` the points of each cut
+    joint.
+    """
     for joint, other in ((a.owner, b), (b.owner, a)):
         if isinstance(joint, Joint) and joint.name in cuts:
             cuts[joint.name].append(other)
@@ -233,6 +245,10 @@ def _sort(
 
 
 def _frame(j: int, point: Point, joint: Joint | None, numbers: Mapping[str, int]) -> FrameRow:
+    """Return the row of frame j, which the joint connects to the point; fixed without a joint.
+
+    `numbers` are the frame numbers by body name.
+    """
     antecedent = numbers[point.owner.name]
     if joint is None:
         return FrameRow(antecedent, 2, **_step(point))
@@ -247,6 +263,7 @@ def _frame(j: int, point: Point, joint: Joint | None, numbers: Mapping[str, int]
 
 
 def _cut_frame(j: int, point: Point, joint: Joint, numbers: Mapping[str, int]) -> FrameRow:
+    """Return the row of frame j, which moves with a cut joint at a point."""
     sigma = _SIGMA.get(type(joint), 2)
     return FrameRow(
         numbers[point.owner.name],
@@ -259,6 +276,7 @@ def _cut_frame(j: int, point: Point, joint: Joint, numbers: Mapping[str, int]) -
 
 
 def _body(j: int, body: RigidBody, joint: Joint | None) -> InertiaRow:
+    """Return the body row of frame j with the drive of its joint."""
     assert isinstance(body, KhalilBody)
     values: dict[str, Any] = {name: getattr(body, name) for name in TEN_PARAMETERS}
     if joint is not None:
@@ -268,6 +286,10 @@ def _body(j: int, body: RigidBody, joint: Joint | None) -> InertiaRow:
 
 
 def _step(point: Point) -> dict[str, Any]:
+    """Return the six Khalil parameters of a point.
+
+    Raise a DescriptionError for other placements.
+    """
     steps = point.placement.steps
     if len(steps) != 1 or not isinstance(steps[0], KhalilStep):
         raise DescriptionError(
@@ -277,11 +299,13 @@ def _step(point: Point) -> dict[str, Any]:
 
 
 def _ranges(joint: Joint) -> dict[str, Any]:
+    """Return the limits of position, velocity and effort of a joint."""
     limits = joint.limits[0][1] if joint.limits else None
     return {"limits": limits, "velocity": joint.velocity, "effort": joint.effort}
 
 
 def _cut_kind(joint: Joint) -> str:
+    """Return the type of a cut joint; raise a DescriptionError if a table does not have it."""
     kind = type(joint).__name__.lower()
     if kind not in LOOP_JOINTS:
         raise DescriptionError(f"{joint.name}: a table of frames closes no loop with a {kind}")
@@ -312,6 +336,7 @@ def shown_tables(system: System, tables: Tables) -> Tables:
 
 
 def _geometry(system: System, row: LinkRow) -> Texts:
+    """Return the cells that show the frame of a link of an assembled mechanism."""
     speeds = system.speeds[system.tree.links[row.number - 1].v]
     places = system.coordinates[system.tree.links[row.number - 1].q]
     cells = dict.fromkeys(GEOMETRY_COLUMNS, "")
@@ -328,16 +353,21 @@ def _geometry(system: System, row: LinkRow) -> Texts:
 
 
 def _fixed_frame(six: tuple[float | SX, ...]) -> str:
-    """Return the text of a fixed frame before a link, with its non-zero parameters."""
+    """Return the text of a fixed frame before a link, with its nonzero parameters.
+
+    `six` are its Khalil parameters.
+    """
     values = (f"{k} {_text(x)}" for k, x in zip(GEOMETRY, six, strict=True) if not _is_zero(x))
     return f"fixed frame ({', '.join(values)})"
 
 
 def _is_zero(value: float | SX) -> bool:
+    """Whether a parameter is the number zero."""
     return not isinstance(value, SX) and value == 0
 
 
 def _inertia(system: System, j: int) -> Texts:
+    """Return the cells that show the inertial parameters of link j (from 0)."""
     link = system.tree.links[j]
     values = dict(zip(TEN_PARAMETERS, (link.inertia.parameters[k] for k in range(10)), strict=True))
     cells = dict.fromkeys(INERTIA_COLUMNS, "")
@@ -348,12 +378,13 @@ def _inertia(system: System, j: int) -> Texts:
 
 
 def _number(system: System, value: SX) -> str:
-    """Return the value with default symbols; the expression if a symbol has no default."""
+    """Return the text of a value with default symbols, or its expression if a symbol has none."""
     at = float(Function("value", [system.p], [value])(system.p_default))
     return str(value) if at != at else _text(at)
 
 
 def _text(value: float | SX) -> str:
+    """Return a number with nine digits, or as a multiple of pi, and an expression as it is."""
     if isinstance(value, SX):
         return str(value)
     exact = written(float(value))

@@ -19,7 +19,10 @@ _NEW_FRAME = dict.fromkeys(GEOMETRY_COLUMNS, "0") | {
 
 
 def with_frame(tables: Tables) -> Tables:
-    """Append a frame to the tables, placed on the last frame that no loop is cut at.
+    """Return the tables with an additional frame, placed on the last frame that no loop is cut at.
+
+    Args:
+        tables: cells of a robot.
 
     Raises:
         DescriptionError: the table is full.
@@ -41,7 +44,11 @@ def with_frame(tables: Tables) -> Tables:
 
 
 def without_frame(tables: Tables, row: int) -> Tables:
-    """Remove frame row + 1 from the tables; frames placed on it move to its antecedent.
+    """Return the tables without a frame; frames that were placed on it move to its antecedent.
+
+    Args:
+        tables: cells of a robot.
+        row: row index of the frame (its number minus one).
 
     Raises:
         DescriptionError: the frame does not exist, or it is the only frame.
@@ -71,13 +78,21 @@ def without_frame(tables: Tables, row: int) -> Tables:
 
 
 def with_loop(tables: Tables) -> Tables:
-    """Append a loop to the tables, cut at the last two frames."""
+    """Return the tables with an additional loop, cut at the last two frames.
+
+    Args:
+        tables: cells of a robot.
+    """
     count = len(tables.geometry)
     return replace(tables, loops=(*tables.loops, (str(max(count - 1, 1)), str(count), "revolute")))
 
 
 def without_loop(tables: Tables, row: int) -> Tables:
-    """Remove a loop from the tables; its frames remain.
+    """Return the tables without a loop; its frames remain.
+
+    Args:
+        tables: cells of a robot.
+        row: row index of the loop, from 0.
 
     Raises:
         DescriptionError: the loop does not exist.
@@ -87,11 +102,13 @@ def without_loop(tables: Tables, row: int) -> Tables:
 
 
 def _require_row(rows: tuple[Texts, ...], row: int, what: str) -> None:
+    """Raise a DescriptionError if there is no row with this index; `what` names the kind of row."""
     if not 0 <= row < len(rows):
         raise DescriptionError(f"there is no {what} {row + 1} to remove; reload the page")
 
 
 def _without(rows: tuple[Texts, ...], row: int) -> tuple[Texts, ...]:
+    """Return the rows without the row of this index."""
     return rows[:row] + rows[row + 1 :]
 
 

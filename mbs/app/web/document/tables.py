@@ -102,7 +102,14 @@ class Cell(NamedTuple):
 
 
 class CellProblem(NamedTuple):
-    """Error message of a cell. The column is "" for a whole row, the sheet "" for the robot."""
+    """Error message of a cell.
+
+    Attributes:
+        sheet: table, as in `Cell`; "" if the error is that of the robot as a whole.
+        row: row index, from 0.
+        column: column; "" for the whole row.
+        sentence: error message.
+    """
 
     sheet: str
     row: int
@@ -111,7 +118,11 @@ class CellProblem(NamedTuple):
 
 
 def written(value: Scalar) -> str:
-    """Return the text of a scalar, with multiples of pi by name."""
+    """Return the text of a number or expression, with multiples of pi by name.
+
+    Args:
+        value: number or expression.
+    """
     known = expression(value)
     if not isinstance(known, Number):
         return str(known)
@@ -119,6 +130,7 @@ def written(value: Scalar) -> str:
 
 
 def _turns() -> dict[float, str]:
+    """Return the names of simple multiples of pi, such as "-pi/2", by value."""
     names: dict[float, str] = {}
     for n, d in _TURNS:
         text = ("-" if n < 0 else "") + ("" if abs(n) == 1 else f"{abs(n)}*") + "pi"
@@ -135,18 +147,22 @@ _PI = _turns()
 def scalar(text: str, where: str) -> Scalar:
     """Return the expression in a cell; zero if the cell is empty.
 
+    Args:
+        text: text of the cell.
+        where: description of the cell, for error messages.
+
     Raises:
         DescriptionError: the text is not in the grammar, or too long.
     """
-    if len(text) > LONGEST_CELL:
-        raise DescriptionError(
-            f"{where}: the text has {len(text)} characters; write at most {LONGEST_CELL}"
-        )
-    return expression(text, where) if text.strip() else 0.0
+    return expression(text, where) if _short(text, where) else 0.0
 
 
 def number(text: str, where: str) -> float:
-    """Return the value of a cell without symbols.
+    """Return the numeric value of a cell without symbols; zero if the cell is empty.
+
+    Args:
+        text: text of the cell.
+        where: description of the cell, for error messages.
 
     Raises:
         DescriptionError: the text contains symbols or is invalid.
@@ -157,6 +173,10 @@ def number(text: str, where: str) -> float:
 def integer(text: str, where: str) -> int:
     """Return the frame number in a cell.
 
+    Args:
+        text: text of the cell.
+        where: description of the cell, for error messages.
+
     Raises:
         DescriptionError: the text is not a frame number.
     """
@@ -166,7 +186,11 @@ def integer(text: str, where: str) -> int:
 
 
 def pair(text: str, where: str) -> tuple[float, float] | None:
-    """Return the limits in a cell; None if the cell is empty.
+    """Return the limits (lower, upper) in a cell; None if the cell is empty.
+
+    Args:
+        text: text of the cell.
+        where: description of the cell, for error messages.
 
     Raises:
         DescriptionError: the text is not two numbers.
@@ -182,7 +206,13 @@ def pair(text: str, where: str) -> tuple[float, float] | None:
 
 
 def span(text: str, where: str) -> tuple[float, float] | float | None:
-    """Return the range in a cell: lower, upper, or a single number for both directions.
+    """Return the range in a cell: (lower, upper), or a single number for both directions.
+
+    None if the cell is empty.
+
+    Args:
+        text: text of the cell.
+        where: description of the cell, for error messages.
 
     Raises:
         DescriptionError: the text is neither of these.
@@ -192,7 +222,11 @@ def span(text: str, where: str) -> tuple[float, float] | float | None:
 
 
 def written_span(value: tuple[float, float] | float | None) -> str:
-    """Return the text of limits or of a range."""
+    """Return the text of limits or of a range; empty for None.
+
+    Args:
+        value: (lower, upper), a single number for both directions, or None.
+    """
     if value is None:
         return ""
     if isinstance(value, (int, float)):
@@ -202,10 +236,15 @@ def written_span(value: tuple[float, float] | float | None) -> str:
 
 
 def word(text: str, where: str, known: Sequence[str]) -> str:
-    """Return the word in a cell, if it is among the known words.
+    """Return the word in a cell, without blanks around it.
+
+    Args:
+        text: text of the cell.
+        where: description of the cell, for error messages.
+        known: allowed words.
 
     Raises:
-        DescriptionError: the word is unknown.
+        DescriptionError: the word is not allowed.
     """
     if text.strip() not in known:
         words = [one for one in known if one]
@@ -214,7 +253,15 @@ def word(text: str, where: str, known: Sequence[str]) -> str:
 
 
 def reader_of(sheet: str, row: int, column: str) -> Callable[[str, str], Any]:
-    """Return the reader of a cell: a callable (text, position) that raises for wrong texts."""
+    """Return the reader of a cell: a callable (text, description of the cell) -> value.
+
+    The callable raises a DescriptionError if the text is invalid.
+
+    Args:
+        sheet: table, as in `Cell`.
+        row: row index, from 0.
+        column: name of the column.
+    """
     if (sheet, column) in CHOICES:
         return lambda text, where: word(text, where, CHOICES[sheet, column])
     if column in ("antecedent", "frame", "other"):
@@ -233,7 +280,11 @@ def reader_of(sheet: str, row: int, column: str) -> Callable[[str, str], Any]:
 
 
 def mount(text: str, where: str) -> dict[str, Any]:
-    """Read the mount in a cell, in the form of `mbs.load`; empty if the cell is empty.
+    """Return the mount in a cell, in the form of `mbs.load`; empty if the cell is empty.
+
+    Args:
+        text: steps separated by semicolons, such as "x=pi; position=0,0,2.5".
+        where: description of the cell, for error messages.
 
     Raises:
         DescriptionError: the text is not a mount.
@@ -246,6 +297,7 @@ def mount(text: str, where: str) -> dict[str, Any]:
 
 
 def _short(text: str, where: str) -> str:
+    """Return a text without blanks around it; raise a DescriptionError if it is too long."""
     if len(text) > LONGEST_CELL:
         raise DescriptionError(
             f"{where}: the text has {len(text)} characters; write at most {LONGEST_CELL}"
@@ -254,7 +306,13 @@ def _short(text: str, where: str) -> str:
 
 
 def place_of(sheet: str, row: int, column: str) -> str:
-    """Return the description of a cell for error messages."""
+    """Return the description of a cell for error messages, such as "frame 3, alpha".
+
+    Args:
+        sheet: table, as in `Cell`.
+        row: row index, from 0.
+        column: name of the column.
+    """
     if sheet == "general":
         return GENERAL_ROWS[row]
     if sheet == "symbols":
@@ -297,10 +355,16 @@ class Tables:
     @property
     def symbols(self) -> Texts:
         """Names of the symbols in readable cells, in the order of their first use."""
-        return tuple(dict.fromkeys(name for value in self._scalars() for name in _names(value)))
+        return tuple(
+            dict.fromkeys(p.name for value in self._scalars() for p in parameters_of(value))
+        )
 
     def rows(self, sheet: str) -> tuple[Texts, ...]:
-        """Return the rows of a table, each in the order of `COLUMNS[sheet]`."""
+        """Return the rows of a table as texts, each in the order of `COLUMNS[sheet]`.
+
+        Args:
+            sheet: table, as in `Cell`.
+        """
         if sheet == "symbols":
             known = dict(self.values)
             return tuple((known.get(name, ""),) for name in self.symbols)
@@ -310,13 +374,23 @@ class Tables:
         return answer
 
     def text(self, cell: Cell) -> str:
-        """Return the text of a cell."""
+        """Return the text of a cell.
+
+        Args:
+            cell: position of the cell.
+        """
         return self.rows(cell.sheet)[cell.row][COLUMNS[cell.sheet].index(cell.column)]
 
     def changed(self, cell: Cell, text: str) -> Tables:
-        """Return the tables with another text in a cell."""
+        """Return the tables with another text in a cell.
+
+        Args:
+            cell: position of an existing cell.
+            text: new text.
+        """
         if cell.sheet == "symbols":
-            return self._with_value(self.symbols[cell.row], text)
+            values = {**dict(self.values), self.symbols[cell.row]: text}
+            return replace(self, values=tuple(values.items()))
         if cell.sheet == "general":
             return replace(self, general=_put(self.general, cell.row, text))
         rows = getattr(self, cell.sheet)
@@ -332,17 +406,23 @@ class Tables:
                     yield Cell(sheet, k, column), text
 
     def joint_name(self, row: int) -> str:
-        """Return the name of the joint of frame row + 1."""
+        """Return the name of the joint in a row: as typed, else q<j>.
+
+        Args:
+            row: row index of the frame (its number j minus one).
+        """
         return self.geometry[row][-1].strip() or f"q{row + 1}"
 
     def body_name(self, row: int) -> str:
-        """Return the name of the body of frame row + 1."""
+        """Return the name of the body in a row: as typed, else link<j>.
+
+        Args:
+            row: row index of the frame (its number j minus one).
+        """
         return self.inertia[row][-1].strip() or f"link{row + 1}"
 
-    def _with_value(self, name: str, text: str) -> Tables:
-        return replace(self, values=tuple({**dict(self.values), name: text}.items()))
-
     def _scalars(self) -> Iterator[Expression]:
+        """Yield the expressions in all cells; zero for cells that cannot be read."""
         for row in self.geometry:
             yield from map(_expression, row[3:9])
         for row in self.inertia:
@@ -353,7 +433,10 @@ class Tables:
         yield from self.mount().expressions()
 
     def mount(self) -> Placement:
-        """Return the pose of the base in the world; the identity if its cell has an error."""
+        """Return the pose of the base in the world.
+
+        The identity if its cell is empty or invalid.
+        """
         try:
             given = mount(self.general[MOUNT_ROW], "mount")
         except MbsError:
@@ -362,7 +445,10 @@ class Tables:
 
 
 def _mounted_cells(table: RobotTable) -> tuple[Texts, tuple[tuple[str, Texts], ...]]:
-    """Return the cells of gravity in the world, source and mount, and the other extras."""
+    """Return the cells of gravity, source and mount, and the extra data without the mount.
+
+    Gravity of a table is in the axes of the base, gravity in the cells in the axes of the world.
+    """
     placement, notes = base_placement(table.extras)
     pose = placement_pose(placement, {})
     kept = tuple((k, v) for k, v in table.extras.items() if notes or k != POSE)
@@ -387,7 +473,11 @@ def _mounted_cells(table: RobotTable) -> tuple[Texts, tuple[tuple[str, Texts], .
 
 
 def tables_of(table: RobotTable) -> Tables:
-    """Return the cells of a table of frames."""
+    """Return the cells of a table of frames.
+
+    Args:
+        table: table of frames.
+    """
     general, extras = _mounted_cells(table)
     bodies = {body.frame: body for body in table.bodies}
     count = len(table.frames)
@@ -411,10 +501,13 @@ def tables_of(table: RobotTable) -> Tables:
 def robot_table(tables: Tables) -> RobotTable:
     """Return the table of frames that the cells describe.
 
+    Args:
+        tables: cells of a robot.
+
     Raises:
         DescriptionError: a cell cannot be read, or rows contradict each other.
     """
-    read = {cell: _read(cell, text) for cell, text in tables.cells()}
+    read = {c: reader_of(*c)(text, place_of(*c)) for c, text in tables.cells()}
     frames, bodies, guess = [], [], dict(tables.guess)
     for k in range(len(tables.geometry)):
         g = {column: read[Cell("geometry", k, column)] for column in GEOMETRY_COLUMNS}
@@ -422,7 +515,7 @@ def robot_table(tables: Tables) -> RobotTable:
         if position is not None:
             guess[tables.joint_name(k)] = position
         frames.append(_frame(g))
-        if _says_something(tables, k):
+        if _has_body_data(tables, k):
             body = {column: read[Cell("inertia", k, column)] for column in INERTIA_COLUMNS}
             rotor, grouped = tables.attached[k]
             bodies.append(InertiaRow(k + 1, rotor=rotor, grouped=grouped, **body))
@@ -449,34 +542,36 @@ def robot_table(tables: Tables) -> RobotTable:
 
 
 def _rotated(gravity: Sequence[Scalar], mounted: Mapping[str, Any]) -> tuple[Scalar, ...]:
-    """Return gravity expressed in the axes of the mounted base."""
+    """Return gravity expressed in the axes of the mounted base.
+
+    `gravity` is in the axes of the world, `mounted` the mount in the form of `mbs.load`.
+    """
     rotation = mounted.get("rotation")
     vector = tuple(map(expression, gravity))
     return vector if rotation is None else in_rotated_axes(vector, rotation, "mount")
 
 
-def _read(cell: Cell, text: str) -> Any:
-    return reader_of(*cell)(text, place_of(*cell))
-
-
 def _frame(values: dict[str, Any]) -> FrameRow:
+    """Return a frame row from the values of its cells, by column."""
     sigma = JOINTS.index(values.pop("joint"))
     return FrameRow(sigma=sigma, actuated=ACTUATED[values.pop("actuated")], **values)
 
 
-def _says_something(tables: Tables, k: int) -> bool:
-    """Return whether the body row of frame k + 1 describes a body."""
+def _has_body_data(tables: Tables, k: int) -> bool:
+    """Whether the body row of frame k + 1 differs from that of a frame without a body."""
     texts = zip(tables.inertia[k], _NO_BODY, strict=True)
     given = any(text.strip() not in ("", usual) for text, usual in texts)
     return given or tables.attached[k] != (None, False)
 
 
 def _loop(tables: Tables, read: Mapping[Cell, Any], k: int) -> CutRow:
+    """Return the cut of loop k (from 0) from the values of the cells."""
     moving, fixed, joint = (read[Cell("loops", k, column)] for column in LOOP_COLUMNS)
     return CutRow((moving, fixed), joint)
 
 
 def _geometry(row: FrameRow, guess: float | None) -> Texts:
+    """Return the cells of a frame row; `guess` is its initial position for closing loops."""
     actuated = next(text for text, value in ACTUATED.items() if value is row.actuated)
     return (
         str(row.antecedent),
@@ -497,22 +592,24 @@ def _motor_span(value: tuple[float, float] | float | None) -> str:
 
 
 def _expression(text: str) -> Expression:
+    """Return the expression in a cell; zero if it cannot be read."""
     try:
         return expression(text if text.strip() else 0.0)
     except (ExpressionError, RecursionError):
         return expression(0.0)
 
 
-def _names(value: Expression) -> Iterator[str]:
-    return (parameter.name for parameter in parameters_of(value))
-
-
 def _put(values: tuple[Any, ...], place: int, value: Any) -> tuple[Any, ...]:
+    """Return the tuple `values` with another value at the index `place`."""
     return (*values[:place], value, *values[place + 1 :])
 
 
 def require_cell(tables: Tables, cell: Cell) -> None:
     """Raise if a cell does not exist.
+
+    Args:
+        tables: cells of a robot.
+        cell: position of the cell.
 
     Raises:
         DescriptionError: the table, row or column does not exist.

@@ -29,7 +29,7 @@ _BASE_COLUMNS = (
 
 
 async def open_base(app: App) -> None:
-    """Open the panel and compute the base parameters of the present robot.
+    """Open the panel of base parameters and compute them for the present robot.
 
     Args:
         app: app of the page.
@@ -42,6 +42,7 @@ async def open_base(app: App) -> None:
 
 
 def _show(app: App, made: BaseTable) -> None:
+    """Show the table of base parameters at the present position of the page."""
     ui.label(
         f"{made.system}: {len(made.rows)} base parameters of {made.total}, {made.method}"
     ).style("font-weight: 600").mark("found")

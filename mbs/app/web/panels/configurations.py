@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
-from collections.abc import Sequence
 from functools import partial
 from typing import Any, cast
 
@@ -23,6 +20,7 @@ from mbs.app.tasks.configurations import (
     pose_of,
     rpy_of,
 )
+from mbs.app.tasks.csv_text import csv_text
 from mbs.app.tasks.equations import entry
 from mbs.app.web.app import App
 from mbs.app.web.panels.equations import open_equations
@@ -32,9 +30,9 @@ from mbs.app.web.panels.layout import (
     in_a_row,
     main_button,
     side_button,
-    tell_of_changes,
     two_sides,
     waiting_note,
+    warn_of_changes,
 )
 from mbs.app.web.panels.text_view import column
 from mbs.assembly import System
@@ -100,27 +98,22 @@ def show_configurations(app: App, made: ConfigurationList) -> None:
 
 
 def csv_of(made: ConfigurationList) -> bytes:
-    """Return the configurations as comma-separated values with a header; positions in rad or m."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
+    """Return the configurations as the content of a CSV file with a header; positions in rad or m.
+
+    Args:
+        made: result of the inverse kinematics.
+    """
     units = zip(made.names, made.units, strict=True)
-    writer.writerow(
-        [
-            "number",
-            *(f"{name} [{unit}]" for name, unit in units),
-            *("residual", "sigma", "roots", "within_limits", "label", "family"),
-        ]
+    head = [
+        "number",
+        *(f"{name} [{unit}]" for name, unit in units),
+        *("residual", "sigma", "roots", "within_limits", "label", "family"),
+    ]
+    rows = (
+        [number, *r.q, r.residual, r.sigma, r.multiplicity, r.within_limits, r.label, r.family]
+        for number, r in enumerate(made.rows, 1)
     )
-    for number, row in enumerate(made.rows, 1):
-        writer.writerow(
-            [
-                number,
-                *map(repr, row.q),
-                *(row.residual, row.sigma, row.multiplicity, row.within_limits),
-                *(row.label, row.family),
-            ]
-        )
-    return stream.getvalue().encode()
+    return csv_text(head, rows).encode()
 
 
 _ROW_STYLE = "row => 'cursor: pointer' + (row.shown ? '; background: var(--d-accent-soft)' : '')"
@@ -134,20 +127,22 @@ _LIMITS = """
 
 
 def _headline(made: ConfigurationList) -> str:
+    """Return the sentence above the table: number of configurations, method and locked joints."""
     count = len(made.rows)
     if not count:
         return f"{made.system}: no configuration takes frame {made.frame} there"
     outside = sum(not row.within_limits for row in made.rows)
-    told = f"{made.system}, frame {made.frame}: {count} configuration{'s' if count > 1 else ''}"
-    told += f" by {made.method}"
+    text = f"{made.system}, frame {made.frame}: {count} configuration{'s' if count > 1 else ''}"
+    text += f" by {made.method}"
     if made.locked:
-        told += "; locked: " + ", ".join(f"{name} = {x:.4g}" for name, x in made.locked)
+        text += "; locked: " + ", ".join(f"{name} = {x:.4g}" for name, x in made.locked)
     for name, taken in made.redundant:
-        told += f"; {taken} positions of {name}"
-    return told + (f"; {outside} outside of limits" if outside else "")
+        text += f"; {taken} positions of {name}"
+    return text + (f"; {outside} outside of limits" if outside else "")
 
 
 def _nothing(app: App, made: ConfigurationList) -> None:
+    """Show the reason why there is no configuration, and a button for the nearest one."""
     ui.label(made.reason[:1].upper() + made.reason[1:] + ".").mark("reason")
     near = made.nearest
     if near is None:
@@ -163,6 +158,7 @@ def _nothing(app: App, made: ConfigurationList) -> None:
 
 
 def _columns(made: ConfigurationList) -> list[dict[str, Any]]:
+    """Return the column definitions of the table of configurations."""
     heads = [("number", "", "right"), ("label", "which one", "left")]
     heads += [(f"q{k}", name, "right") for k, name in enumerate(made.names)]
     heads += [("residual", "residual", "right"), ("sigma", "sigma", "right")]
@@ -173,10 +169,12 @@ def _columns(made: ConfigurationList) -> list[dict[str, Any]]:
 
 
 def _rows(made: ConfigurationList, unit: str) -> list[dict[str, Any]]:
+    """Return the rows of the table, with angles in `unit` ("rad" or "deg")."""
     return [_row(made, number, row, unit) for number, row in enumerate(made.rows, 1)]
 
 
 def _row(made: ConfigurationList, number: int, row: Configuration, unit: str) -> dict[str, Any]:
+    """Return a row of the table, with angles in `unit` ("rad" or "deg")."""
     factors = [_DEGREES if unit == DEG and u == "rad" else 1.0 for u in made.units]
     digits = 2 if unit == DEG else 4
     values = {
@@ -196,6 +194,7 @@ def _row(made: ConfigurationList, number: int, row: Configuration, unit: str) ->
 
 
 def _outside(row: Configuration) -> str:
+    """Return the text of the joints that are outside their limits."""
     return f"outside: {', '.join(row.outside)}" if row.outside else "outside"
 
 
@@ -210,7 +209,10 @@ _ROUNDED = 1e-12
 
 
 class PoseFields:
-    """Fields of a pose in two forms; a single form is visible. `show` sets both forms."""
+    """Fields in which the user types a pose, in one of two forms.
+
+    The forms are a position with three angles, and a matrix; only the selected form is visible.
+    """
 
     def __init__(self) -> None:
         self._form = ui.toggle([ANGLES, MATRIX], value=ANGLES, on_change=self._switch)
@@ -235,18 +237,26 @@ class PoseFields:
         return pose_from(texts[:3], texts[3:])
 
     def show(self, T: Array) -> None:
-        """Write a pose (4, 4) into the fields."""
+        """Write a pose into the fields of both forms.
+
+        Args:
+            T: (4, 4) homogeneous matrix.
+        """
         values = [*np.asarray(T, dtype=float)[:3, 3].tolist(), *rpy_of(T)]
         for field, value in zip(self._fields, values, strict=True):
             field.set_value(_text(value))
-        self._matrix.set_value("\n".join(_line(row) for row in np.asarray(T).tolist()))
+        self._matrix.set_value(
+            "\n".join("  ".join(map(_text, row)) for row in np.asarray(T).tolist())
+        )
 
     def _switch(self) -> None:
+        """Show the fields of the selected form."""
         self._angles.set_visibility(self._form.value == ANGLES)
         self._matrix.set_visibility(self._form.value == MATRIX)
 
 
 def _field(name: str) -> ui.input:
+    """Create the field of a coordinate of the pose."""
     field = ui.input(name).props(FIELD)
     if "rad" in name:
         field.tooltip("R = Rz(yaw) Ry(pitch) Rx(roll)")
@@ -256,10 +266,6 @@ def _field(name: str) -> ui.input:
 def _text(value: float) -> str:
     """Return a number as text that is read back to the same double; 0 for rounding errors."""
     return "0" if abs(value) < _ROUNDED else repr(float(value))
-
-
-def _line(row: Sequence[float]) -> str:
-    return "  ".join(_text(value) for value in row)
 
 
 KEY = "configurations"
@@ -274,7 +280,7 @@ _POSITIONS = {
 
 
 async def open_configurations(app: App, key: str = "igm-general") -> None:
-    """Open the panel, with the present pose of the frame.
+    """Open the panel of inverse kinematics with the present pose of the frame.
 
     Args:
         app: app of the page.
@@ -329,7 +335,7 @@ class _ConfigurationsPanel:
                 side_button("Equations", partial(self._equations, key), "Of the method, as text")
         with self._shown:
             waiting_note("Every configuration that takes the frame to the pose appears here.")
-        tell_of_changes(app, self._shown)
+        warn_of_changes(app, self._shown)
         app.on_robot(self._robot_changed)
 
     def _robot_changed(self) -> None:
@@ -409,22 +415,24 @@ class _ConfigurationsPanel:
             **redundant,
         )
         show = partial(show_configurations, self._app)
-        asking = TaskButton(self._app, self._button, self._shown, show)
-        await asking.run("Solving the inverse geometry", task, T)
+        task_button = TaskButton(self._app, self._button, self._shown, show)
+        await task_button.run("Solving the inverse geometry", task, T)
 
     async def _framed(self) -> None:
+        """Store the selected frame and show its present pose."""
         notes = cast(dict[str, Any], self._app.session.notes[KEY])
         notes["frame"] = self._frame.value
         self._offer_joints()
         await self.take_present()
 
     async def _equations(self, key: str) -> None:
+        """Open the equations of the selected method, or else of the model `key`."""
         named = {"pieper": "igm-pieper", "paul": "igm-paul", "general": "igm-general"}
         await open_equations(self._app, named.get(str(self._method.value), key))
 
 
 def _frames(system: System) -> dict[str | int, str]:
-    """Return the frames that can be selected, and their labels."""
+    """Return the labels of the frames that can be selected, by frame."""
     numbers = system.numbered or range(1, len(system.tree.links) + 1)
     frames = (*numbers, *system.named_frames, terminal_frame(system))
     return {frame: frame_label(system, frame) for frame in frames}

@@ -13,8 +13,8 @@ from mbs.app.web.panels.layout import (
     in_a_row,
     main_button,
     new_answer,
-    tell_of_changes,
     two_sides,
+    warn_of_changes,
 )
 from mbs.app.web.panels.optimizer import passes_of
 from mbs.app.web.panels.text_view import BEFORE, count_table, steps_table, text_view
@@ -41,12 +41,12 @@ _OFF = "without the optimizer"
 
 
 async def open_equations(app: App, key: str, language: str | None = None) -> None:
-    """Open the panel of a model and write its equations with the options of the last time.
+    """Open the panel of a model and write its equations with the options that were last chosen.
 
     Args:
         app: app of the page.
         key: key of the model.
-        language: initial language. Default: the language of the last time.
+        language: initial language. Default: the language that was last chosen.
     """
     one = entry(key)
     system = app.checked_system()
@@ -62,7 +62,7 @@ async def open_equations(app: App, key: str, language: str | None = None) -> Non
 
 
 class _EquationsPanel:
-    """Panel with the form at the left and the equations at the right."""
+    """Panel of the equations of a model, with the form at the left and the text at the right."""
 
     def __init__(self, app: App, one: Entry) -> None:
         self._app, self._entry = app, one
@@ -73,25 +73,31 @@ class _EquationsPanel:
         with left:
             self._head()
             self._form = OptionForm(app, one, given)
-            self._language = ui.select([], label="language", on_change=self._spoken)
+            self._language = ui.select([], label="language", on_change=self._language_changed)
             self._language.props(FIELD).style("width: 100%").mark("language")
             with in_a_row():
                 self._button = main_button("Write", self.write)
                 self._optimizer = ui.checkbox("optimizer", value=bool(passes_of(app.session)))
                 self._optimizer.props("dense").mark("optimizer")
                 self._optimizer.tooltip("With the passes that the menu Optimizer has chosen")
-            tell_of_changes(app, self._shown)
+            warn_of_changes(app, self._shown)
             self._counts = ui.element("div").style(
                 "display: flex; flex-direction: column; gap: 8px"
             )
 
     def _head(self) -> None:
+        """Show title and symbol of the model."""
         with in_a_row():
             ui.label(self._entry.title).style("font-weight: 600; font-size: 15px")
             ui.label(self._entry.symbol).classes("app-note").style("font-family: var(--d-mono)")
 
     async def fill(self, language: str | None) -> None:
-        """Show the options and languages of the present robot."""
+        """Show the options and languages of the present robot.
+
+        Args:
+            language: language to select; None for plain words if the model has them, else the last
+                language.
+        """
         await self._form.fill()
         offered = languages(self._entry, self._app.system())
         wanted = language or self._app.session.notes.get(_SPOKEN)
@@ -100,14 +106,18 @@ class _EquationsPanel:
         value = wanted if wanted in offered else offered[0]
         self._language.set_options({name: TITLES[name] for name in offered}, value=value)
 
-    async def _spoken(self) -> None:
+    async def _language_changed(self) -> None:
+        """Store the selected language and write the equations in it."""
         if self._language.value not in (None, WORDS):
             self._app.session.notes[_SPOKEN] = self._language.value
         if self._ready:
             await self.write()
 
     async def write(self) -> None:
-        """Write the equations for the present form; calls during this run cause another run."""
+        """Write the equations for the present form.
+
+        A call during a computation makes the computation start again when it ends.
+        """
         self._again = self._ready = True
         if self._busy:
             return
@@ -123,6 +133,7 @@ class _EquationsPanel:
                 self._button.enable()
 
     async def _write(self) -> None:
+        """Compute and show the equations once."""
         one, app = self._entry, self._app
         passes = (passes_of(app.session) or EVERY_PASS) if self._optimizer.value else ()
         args = (one.key, self._form.given, self._language.value, passes)
@@ -139,6 +150,7 @@ class _EquationsPanel:
 
 
 def _show_counts(made: WrittenEquations) -> None:
+    """Show the operation counts of a model and the passes of the optimizer."""
     if made.before is None or made.after is None:
         return
     counts = {"before": made.before, "after": made.after}
@@ -150,11 +162,13 @@ def _show_counts(made: WrittenEquations) -> None:
 
 
 def _about(made: WrittenEquations) -> str:
-    chosen = ", ".join(f"{name} {_say(value)}" for name, value in made.choices)
+    """Return a line with inputs, outputs, options and computing time of a model."""
+    chosen = ", ".join(f"{name} {_option_text(value)}" for name, value in made.choices)
     ends = f"{', '.join(made.inputs)} -> {', '.join(made.outputs)}" if made.inputs else ""
-    told = "; ".join(part for part in (ends, chosen, f"{made.seconds:.2g} s") if part)
-    return f"{made.system}: {told}"
+    facts = "; ".join(part for part in (ends, chosen, f"{made.seconds:.2g} s") if part)
+    return f"{made.system}: {facts}"
 
 
-def _say(value: object) -> str:
+def _option_text(value: object) -> str:
+    """Return the value of an option as text."""
     return "(" + " ".join(map(str, value)) + ")" if isinstance(value, tuple) else str(value)

@@ -24,15 +24,20 @@ _NOTE = "export"
 
 
 @dataclass(slots=True)
-class _ExportAsked:
-    """Values of the form."""
+class _ExportForm:
+    """Values of the form of the export panel.
+
+    Attributes:
+        models: keys of the models in the C library.
+        fmu: values of the options of the FMU.
+    """
 
     models: list[str] = field(default_factory=lambda: list(exporting.MODELS))
     fmu: FormValues = field(default_factory=lambda: first_values(FmuOptions))
 
 
 def open_export(app: App) -> None:
-    """Open the panel for the present robot.
+    """Open the panel that exports files of the present robot.
 
     Args:
         app: app of the page.
@@ -40,17 +45,18 @@ def open_export(app: App) -> None:
     system = app.checked_system()
     if system is None:
         return
-    asked = deepcopy(cast(_ExportAsked, app.session.notes.get(_NOTE, _ExportAsked())))
-    app.session.notes[_NOTE] = asked
+    form = deepcopy(cast(_ExportForm, app.session.notes.get(_NOTE, _ExportForm())))
+    app.session.notes[_NOTE] = form
     add_look()
     with app.open("Export", key="export"), ui.element("div").classes("app-cards"):
-        _fmu_card(app, system, asked)
+        _fmu_card(app, system, form)
         with ui.element("div").style("display: grid; gap: 14px"):
-            _c_card(app, system, asked)
+            _c_card(app, system, form)
             _files_card(app)
 
 
-def _fmu_card(app: App, system: System, asked: _ExportAsked) -> None:
+def _fmu_card(app: App, system: System, form: _ExportForm) -> None:
+    """Create the form of the FMU and its download button."""
     with ui.element("div").classes("app-card"):
         _head(
             "FMU",
@@ -60,22 +66,24 @@ def _fmu_card(app: App, system: System, asked: _ExportAsked) -> None:
         outputs = option_fields(FmuOptions)["outputs"][1].offered
         offered = {"outputs": [name for name in outputs if _is_offered(system, name)]}
         joint = system.speeds[system.active[0]].name if system.active else "j1"
-        option_form(FmuOptions, asked.fmu, offered, joint)
+        option_form(FmuOptions, form.fmu, offered, joint)
 
         async def make() -> None:
-            texts = form_texts(FmuOptions, asked.fmu)
-            await _hand_out(app, ".fmu", "Writing the FMU", exporting.fmu, texts)
+            texts = form_texts(FmuOptions, form.fmu)
+            await _run_and_download(app, ".fmu", "Writing the FMU", exporting.fmu, texts)
 
         _button("Download FMU", "fmu", make)
 
 
 def _is_offered(system: System, output: str) -> bool:
+    """Whether the system has an output group of the FMU, such as "closure" or "sensors"."""
     if output == "closure":
         return system.is_closed
     return output != "sensors" or bool(system.sensors)
 
 
-def _c_card(app: App, system: System, asked: _ExportAsked) -> None:
+def _c_card(app: App, system: System, form: _ExportForm) -> None:
+    """Create the form of the C library and its download button."""
     with ui.element("div").classes("app-card"):
         _head(
             "C library",
@@ -83,22 +91,23 @@ def _c_card(app: App, system: System, asked: _ExportAsked) -> None:
             " and a program that runs every function once",
         )
         models = _models(system)
-        asked.models = [key for key in asked.models if key in models]
+        form.models = [key for key in form.models if key in models]
         several_field(
             FieldLook("Models", "100%", "models"),
             models,
-            asked.models,
-            partial(setattr, asked, "models"),
+            form.models,
+            partial(setattr, form, "models"),
         )
 
         async def make() -> None:
-            keys = tuple(asked.models)
-            await _hand_out(app, ".zip", "Writing C", exporting.c_library, keys)
+            keys = tuple(form.models)
+            await _run_and_download(app, ".zip", "Writing C", exporting.c_library, keys)
 
         _button("Download C library", "c-library", make)
 
 
 def _files_card(app: App) -> None:
+    """Create the download buttons of robot files and of the picture."""
     with ui.element("div").classes("app-card"):
         _head(
             "Robot and picture",
@@ -123,17 +132,21 @@ async def _robot_file(app: App, suffix: str) -> None:
         app.download(cast(str, text).encode("utf-8"), f"{document.file_name}{suffix}")
     else:
         task = exporting.toml if suffix == ".toml" else exporting.par
-        await _hand_out(app, suffix, f"Writing {suffix}", task)
+        await _run_and_download(app, suffix, f"Writing {suffix}", task)
 
 
 async def _picture(app: App) -> None:
-    await _hand_out(app, ".html", "Drawing", exporting.html, tuple(app.q))
+    """Download the picture in the present configuration as an HTML file."""
+    await _run_and_download(app, ".html", "Drawing", exporting.html, tuple(app.q))
 
 
-async def _hand_out(
+async def _run_and_download(
     app: App, suffix: str, label: str, task: Callable[..., bytes], *args: Any
 ) -> None:
-    """Run a task and download its result, with the file name of the present robot."""
+    """Run `task(system, *args)` and download the bytes that it returns.
+
+    The file has the name of the robot and a suffix; `label` describes the task to the user.
+    """
     name = f"{app.document.file_name}{suffix}"
     made = await app.run(label, task, *args)
     if made is not None:
@@ -148,11 +161,13 @@ def _models(system: System) -> dict[str, str]:
 
 
 def _head(title: str, note: str) -> None:
+    """Show the title of a card and a note below it."""
     ui.label(title).classes("app-card-title")
     ui.label(note).classes("app-note")
 
 
 def _button(title: str, marker: str, handler: Callable[[], Any]) -> None:
+    """Create a download button that calls `handler` and is disabled while it runs."""
     button = ui.button(title, icon="download").props("outline no-caps dense").mark(marker)
     button.style("padding: 2px 12px")
 

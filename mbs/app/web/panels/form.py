@@ -48,7 +48,10 @@ class OptionForm:
         return dict(self._given)
 
     async def fill(self) -> None:
-        """Show the options of the present robot; values that it does not offer are dropped."""
+        """Show the options of the present robot.
+
+        Chosen values that it does not offer are dropped.
+        """
         try:
             system = self._app.system()
             rows = await self._app.aside(_rows, system, self._entry, self._given)
@@ -64,10 +67,13 @@ class OptionForm:
         self._box.set_visibility(bool(rows))
 
     def _robot_changed(self) -> None:
+        """Show the options again after an assembly."""
         if not self._box.is_deleted:
             background_tasks.create(self.fill(), name=f"options of {self._entry.key}")
 
     def _field(self, system: System, row: OptionRow) -> None:
+        """Create the field of an option."""
+
         async def changed(event: ValueChangeEventArguments[Any]) -> None:
             await self._take(row, event.value)
 
@@ -87,7 +93,7 @@ class OptionForm:
         field.props(FIELD).style(f"flex: 1 1 {width}px").mark(f"option.{row.name}")
 
     async def _take(self, row: OptionRow, value: Any) -> None:
-        """Store a value; lists that may depend on it are reset to their defaults."""
+        """Store the value of an option; lists that may depend on it are reset to their defaults."""
         self._given[row.name] = tuple(value) if row.kind == "several" else value
         names = [option.name for option in self._entry.options]
         later = self._entry.options[names.index(row.name) + 1 :]
@@ -100,7 +106,12 @@ class OptionForm:
 
 
 def frame_label(system: System, frame: object) -> str:
-    """Return the label of a frame in a form: 0 (base), 3 (q3), tool."""
+    """Return the label of a frame in a form, such as "0 (base)", "3 (q3)" or "tool".
+
+    Args:
+        system: the mechanism.
+        frame: number of a link, or name of a frame.
+    """
     if frame == 0:
         return "0 (base)"
     if isinstance(frame, int) and frame in system.numbered:
@@ -112,7 +123,10 @@ def frame_label(system: System, frame: object) -> str:
 
 
 def _rows(system: System, entry: Entry, given: Given) -> tuple[OptionRow, ...]:
-    """Return the options of a model; values that are not offered are removed from `given`."""
+    """Return the options of a model.
+
+    Chosen values that are not offered are removed from `given`.
+    """
     for option in entry.options:
         if option.name in given:
             offered = option.values(system, given)

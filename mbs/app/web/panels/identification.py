@@ -20,7 +20,7 @@ from mbs.app.tasks.identification import (
     record_columns,
 )
 from mbs.app.web.app import App
-from mbs.app.web.panels.layout import TaskButton, tell_of_changes
+from mbs.app.web.panels.layout import TaskButton, warn_of_changes
 from mbs.app.web.panels.options_form import (
     FormValues,
     first_values,
@@ -98,6 +98,7 @@ def show_results(app: App, found: Identified) -> None:
 
 
 def _files(app: App, found: Identified) -> None:
+    """Create the buttons that download estimates, residuals and report."""
     stem = found.name
     files = {
         "Estimates": (lambda: found.csv(), f"{stem}_estimates.csv"),
@@ -114,6 +115,7 @@ def _files(app: App, found: Identified) -> None:
 
 
 def _estimates(found: Identified) -> None:
+    """Show the tables of estimates and of the errors of the efforts."""
     rows = [
         {
             "name": row.name,
@@ -145,6 +147,7 @@ def _estimates(found: Identified) -> None:
 
 
 def _residuals(found: Identified) -> None:
+    """Show charts of measured and predicted efforts and of their differences."""
     with ui.element("div").classes("app-residuals"):
         for k, effort in enumerate(found.efforts):
             measured, predicted = found.measured[:, k], found.predicted[:, k]
@@ -156,6 +159,7 @@ def _residuals(found: Identified) -> None:
 
 
 def _report(found: Identified) -> None:
+    """Show the report as text."""
     ui.label(found.text).classes("app-code").style("max-height: 420px")
 
 
@@ -163,6 +167,7 @@ _VIEWS = {"Estimates": _estimates, "Residuals": _residuals, "Report": _report}
 
 
 def _table(columns: tuple[tuple[str, str, str], ...], rows: list[dict[str, Any]]) -> None:
+    """Create a table; `columns` are (field, title, alignment)."""
     heads = [column(*one) for one in columns]
     table = ui.table(rows=rows, columns=heads, row_key="name").props("dense flat hide-bottom")
     table.classes("app-table")
@@ -175,6 +180,7 @@ def _terms(row: EstimateRow) -> str:
 
 
 def _percent(value: float) -> str:
+    """Return a percentage as text, "-" if it is very large or not finite."""
     if not math.isfinite(value) or value >= _NOTHING:
         return "-"
     return f"{value:.0f}" if value >= 10 else f"{value:.2g}"
@@ -187,8 +193,15 @@ _LONGEST_LIST = 12
 
 
 @dataclass(slots=True)
-class _IdentificationAsked:
-    """Values of the form."""
+class _IdentificationForm:
+    """Values of the form of the identification panel.
+
+    Attributes:
+        content, file: content and name of the uploaded record.
+        bandwidth: bandwidth of the filters [Hz].
+        velocities: source of velocities, a name in `VELOCITIES`.
+        options: values of further options.
+    """
 
     content: bytes = b""
     file: str = ""
@@ -197,12 +210,13 @@ class _IdentificationAsked:
     options: FormValues = field(default_factory=lambda: first_values(IdentifyArguments))
 
     def settings(self) -> IdentificationSettings:
+        """Return the settings that the form specifies."""
         options = form_texts(IdentifyArguments, self.options)
         return IdentificationSettings(self.bandwidth, self.velocities, options)
 
 
 def open_identification(app: App) -> None:
-    """Open the panel for the present robot.
+    """Open the panel that identifies the parameters of the present robot.
 
     Args:
         app: app of the page.
@@ -210,16 +224,14 @@ def open_identification(app: App) -> None:
     system = app.checked_system()
     if system is None:
         return
-    asked = deepcopy(
-        cast(_IdentificationAsked, app.session.notes.get(_NOTE, _IdentificationAsked()))
-    )
-    app.session.notes[_NOTE] = asked
+    form = deepcopy(cast(_IdentificationForm, app.session.notes.get(_NOTE, _IdentificationForm())))
+    app.session.notes[_NOTE] = form
     add_look()
     with app.open("Identify", key="identify"), ui.element("div").classes("app-halves"):
         with ui.element("div").classes("app-half").style("flex: 0 0 350px"):
             _explain(system)
-            _upload(app, asked)
-            _form(asked)
+            _upload(app, form)
+            _form(form)
             button = ui.button("Identify").props("unelevated no-caps dense").mark("identify")
             button.style("padding: 2px 22px; align-self: start")
         shown = ui.element("div").classes("app-half app-stays")
@@ -231,14 +243,18 @@ def open_identification(app: App) -> None:
                 ui.label("Estimates and residuals appear here.").classes("app-note")
 
     async def run() -> None:
-        await _run(app, asked, button, shown)
+        await _run(app, form, button, shown)
 
-    tell_of_changes(app, shown)
+    warn_of_changes(app, shown)
     button.on_click(run)
 
 
-async def _run(app: App, asked: _IdentificationAsked, button: ui.button, shown: ui.element) -> None:
-    if not asked.content:
+async def _run(app: App, form: _IdentificationForm, button: ui.button, shown: ui.element) -> None:
+    """Identify the robot from the record in the form, and show the result in `shown`.
+
+    `button` is disabled meanwhile. An error is shown if there is no record.
+    """
+    if not form.content:
         app.complain("there is no record yet; upload a file of comma-separated values first")
         return
     document = app.document
@@ -250,11 +266,12 @@ async def _run(app: App, asked: _IdentificationAsked, button: ui.button, shown: 
 
     task = partial(identify, quiet=True)
     await TaskButton(app, button, shown, show).run(
-        "Identifying", task, asked.content, asked.settings()
+        "Identifying", task, form.content, form.settings()
     )
 
 
 def _explain(system: System) -> None:
+    """Show a note about the columns that a record must have."""
     columns = record_columns(system)
     names = [*columns["time"], *columns["q"], *columns["tau"]]
     if system.is_closed:
@@ -268,15 +285,17 @@ def _explain(system: System) -> None:
     ).classes("app-note")
 
 
-def _upload(app: App, asked: _IdentificationAsked) -> None:
+def _upload(app: App, form: _IdentificationForm) -> None:
+    """Create the button that uploads a record into the form."""
+
     async def uploaded(event: Any) -> None:
         upload.reset()
         if event.file.size() > LARGEST:
             app.complain(f"the record has more than {LARGEST / 1e6:.0f} MB; cut it into pieces")
             return
-        asked.content = await event.file.read()
-        asked.file = str(event.file.name)
-        told.set_text(_told(asked))
+        form.content = await event.file.read()
+        form.file = str(event.file.name)
+        label.set_text(_record_text(form))
 
     def rejected() -> None:
         app.complain(
@@ -294,26 +313,28 @@ def _upload(app: App, asked: _IdentificationAsked) -> None:
     with ui.element("div").classes("app-result-head"):
         choose = ui.button("Upload a record…", icon="upload_file").props("outline no-caps dense")
         choose.style("padding: 2px 12px").on_click(lambda: upload.run_method("pickFiles"))
-        told = ui.label(_told(asked)).classes("app-note").mark("record")
+        label = ui.label(_record_text(form)).classes("app-note").mark("record")
 
 
-def _told(asked: _IdentificationAsked) -> str:
-    if not asked.content:
+def _record_text(form: _IdentificationForm) -> str:
+    """Return name and size of the uploaded record as text."""
+    if not form.content:
         return "No record yet."
-    return f"{quoted(asked.file)[1:-1]}, {len(asked.content) / 1e3:.0f} kB"
+    return f"{quoted(form.file)[1:-1]}, {len(form.content) / 1e3:.0f} kB"
 
 
-def _form(asked: _IdentificationAsked) -> None:
+def _form(form: _IdentificationForm) -> None:
+    """Create the fields of the settings."""
     with ui.element("div").classes("app-form"):
         look = FieldLook("Bandwidth [Hz]", "120px", "bandwidth")
-        field = text_field(look, asked.bandwidth, partial(setattr, asked, "bandwidth"))
+        field = text_field(look, form.bandwidth, partial(setattr, form, "bandwidth"))
         field.tooltip("of the filters; five to ten times the highest frequency of the motion")
-        option_row(IdentifyArguments, asked.options)
+        option_row(IdentifyArguments, form.options)
         choice_field(
             FieldLook("Velocities", "160px", "velocities"),
             {name: name for name in VELOCITIES},
-            asked.velocities,
-            partial(setattr, asked, "velocities"),
+            form.velocities,
+            partial(setattr, form, "velocities"),
         )
         look = FieldLook("Beside bodies and friction", "324px", "columns")
-        flags_field(IdentifyArguments, asked.options, look)
+        flags_field(IdentifyArguments, form.options, look)

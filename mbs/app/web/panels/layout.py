@@ -17,7 +17,10 @@ def two_sides(width: str = "330px") -> tuple[ui.element, ui.element]:
     """Create two columns at the present position; the right one takes the remaining width.
 
     Args:
-        width: width of the left column.
+        width: width of the left column in CSS.
+
+    Returns:
+        The left and the right column.
     """
     with ui.element("div").style("display: flex; gap: 22px; align-items: start; width: 100%"):
         left = ui.element("div").style(
@@ -37,19 +40,34 @@ def in_a_row() -> ui.element:
 
 
 def main_button(title: str, act: Callable[[], Any] | None = None) -> ui.button:
-    """Create the button that computes the result."""
+    """Create the button that computes the result.
+
+    Args:
+        title: text of the button.
+        act: action of the button.
+    """
     button = ui.button(title, on_click=act).props("unelevated no-caps dense")
     return button.style("padding: 3px 18px").mark(title.lower())
 
 
 def side_button(title: str, act: Callable[[], Any], words: str = "") -> ui.button:
-    """Create a secondary button with a tooltip."""
+    """Create a secondary button.
+
+    Args:
+        title: text of the button.
+        act: action of the button.
+        words: tooltip.
+    """
     button = ui.button(title, on_click=act).props("flat no-caps dense")
     return button.tooltip(words) if words else button
 
 
 def waiting_note(sentence: str) -> None:
-    """Show a note at the place of a result that does not exist yet."""
+    """Show a note at the place of a result that does not exist yet.
+
+    Args:
+        sentence: note.
+    """
     ui.label(sentence).classes("app-note")
 
 
@@ -60,13 +78,13 @@ _ANSWER = 2
 
 @contextmanager
 def new_answer(app: App, shown: ui.element, document: Document) -> Iterator[None]:
-    """Replace a result: clear its container, and add the elements of the block.
+    """Replace a result by the elements that the block creates.
 
-    If the robot was changed since the computation, a note is shown.
+    If the robot was changed since the computation, a note is shown above them.
 
     Args:
         app: app of the page.
-        shown: container of the result.
+        shown: container of the result; it is cleared.
         document: robot for which the result was computed.
     """
     shown.clear()
@@ -93,7 +111,15 @@ class TaskButton:
     show: Callable[[Any], None]
 
     async def run(self, label: str, task: Callable[..., Any], *args: Any) -> None:
-        """Show the result of `task(system, *args)`; see `App.run`."""
+        """Compute `task(system, *args)` and show its result.
+
+        An error is shown as a notification; see `App.run`.
+
+        Args:
+            label: description of the task for the user.
+            task: function of a module; its arguments and its result are plain data.
+            *args: further arguments.
+        """
         document = self.app.document
         self.button.disable()
         try:
@@ -106,7 +132,7 @@ class TaskButton:
                 self.show(made)
 
 
-def tell_of_changes(app: App, shown: ui.element) -> None:
+def warn_of_changes(app: App, shown: ui.element) -> None:
     """Show a note above a result as soon as the robot changes.
 
     Args:
@@ -126,4 +152,5 @@ def tell_of_changes(app: App, shown: ui.element) -> None:
 
 
 def _note_of_change() -> ui.label:
+    """Create the note that the robot has changed since the computation."""
     return ui.label(_CHANGED).classes("app-bad")

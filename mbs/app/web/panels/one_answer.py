@@ -16,9 +16,9 @@ from mbs.app.web.panels.layout import (
     in_a_row,
     main_button,
     side_button,
-    tell_of_changes,
     two_sides,
     waiting_note,
+    warn_of_changes,
 )
 
 
@@ -53,7 +53,7 @@ async def open_one_answer(
     width: str = "330px",
     language: str | None = None,
 ) -> None:
-    """Open the panel and compute the result with the options of the last time.
+    """Open a panel and compute its result with the options that were last chosen.
 
     Args:
         app: app of the page.
@@ -64,7 +64,7 @@ async def open_one_answer(
         show: callable that displays a result at the present position of the page.
         title: title of the panel. Default: the title of the model.
         width: width of the left side.
-        language: language in which the equations open. Default: the language of the last time.
+        language: language in which the equations open. Default: the language that was last chosen.
     """
     one = entry(key)
     given = cast(Given, app.session.notes.setdefault(f"options {key}", {}))
@@ -81,11 +81,11 @@ async def open_one_answer(
     with shown:
         waiting_note(texts.waiting)
 
-    tell_of_changes(app, shown)
+    warn_of_changes(app, shown)
 
     async def ask() -> None:
-        asking = TaskButton(app, button, shown, partial(show, app))
-        await asking.run(texts.label, task, *arguments(form.given))
+        task_button = TaskButton(app, button, shown, partial(show, app))
+        await task_button.run(texts.label, task, *arguments(form.given))
 
     button.on_click(ask)
     await form.fill()

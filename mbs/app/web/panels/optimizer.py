@@ -12,9 +12,9 @@ from mbs.app.web.panels.layout import (
     TaskButton,
     in_a_row,
     main_button,
-    tell_of_changes,
     two_sides,
     waiting_note,
+    warn_of_changes,
 )
 from mbs.app.web.panels.text_view import BEFORE, column, plain_table
 from mbs.app.web.session import Session
@@ -27,19 +27,35 @@ _NOTE = "optimizer"
 
 
 def passes_of(session: Session) -> tuple[str, ...]:
-    """Return the chosen passes in the order of application; empty if the optimizer is off."""
+    """Return the chosen passes in the order of application; empty if the optimizer is off.
+
+    Args:
+        session: session of the visitor.
+    """
     settings = optimizer_settings(session)
     return tuple(p for p in EVERY_PASS if p in settings["passes"]) if settings["on"] else ()
 
 
 def optimizer_settings(session: Session) -> dict[str, Any]:
-    """Return the mutable settings: "on" (whether it is on) and "passes" (names of passes)."""
+    """Return the mutable settings of the optimizer.
+
+    Args:
+        session: session of the visitor.
+
+    Returns:
+        Dict of "on" (whether it is on) and "passes" (names of the chosen passes).
+    """
     found = session.notes.setdefault(_NOTE, {"on": True, "passes": list(EVERY_PASS)})
     return cast(dict[str, Any], found)
 
 
 def optimizer_switch(session: Session, title: str) -> ui.checkbox:
-    """Create a checkbox that turns the optimizer on and off."""
+    """Create a checkbox that turns the optimizer on and off.
+
+    Args:
+        session: session of the visitor.
+        title: label of the checkbox.
+    """
     settings = optimizer_settings(session)
 
     def changed() -> None:
@@ -50,7 +66,7 @@ def optimizer_switch(session: Session, title: str) -> ui.checkbox:
 
 
 def open_optimizer(app: App) -> None:
-    """Open the panel.
+    """Open the panel of the optimizer.
 
     Args:
         app: app of the page.
@@ -67,16 +83,18 @@ def open_optimizer(app: App) -> None:
     with shown:
         waiting_note("What the passes save in every model appears here.")
 
-    tell_of_changes(app, shown)
+    warn_of_changes(app, shown)
 
     async def count_all() -> None:
-        asking = TaskButton(app, button, shown, _show)
-        await asking.run("Counting operations", counts, (), passes_of(app.session))
+        task_button = TaskButton(app, button, shown, _show)
+        await task_button.run("Counting operations", counts, (), passes_of(app.session))
 
     button.on_click(count_all)
 
 
 def _pass(chosen: list[str], name: str, meaning: str) -> None:
+    """Create the checkbox of a pass, which adds its name to `chosen` or removes it."""
+
     def changed() -> None:
         if name in chosen:
             chosen.remove(name)
@@ -90,6 +108,7 @@ def _pass(chosen: list[str], name: str, meaning: str) -> None:
 
 
 def _show(made: tuple[CountRow, ...]) -> None:
+    """Show the table of operation counts of all models."""
     heads = (
         ("title", "model", "left"),
         ("before", "before: mul/add", "right"),
@@ -112,6 +131,7 @@ def _show(made: tuple[CountRow, ...]) -> None:
 
 
 def _row(row: CountRow, before: Count, after: Count) -> dict[str, object]:
+    """Return the row of a model with its operation counts before and after the optimizer."""
     saved = 100 * (1 - after.total / before.total) if before.total else 0
     return {
         "title": row.title,

@@ -10,7 +10,14 @@ from typing import Any
 from nicegui import ui
 
 from mbs.app.web.panels.plots import FieldLook, choice_field, several_field, text_field
-from mbs.options import OptionInfo, default_text, option_fields, title_of, value_kinds
+from mbs.options import (
+    OptionInfo,
+    ValueKind,
+    default_text,
+    option_fields,
+    title_of,
+    value_kinds,
+)
 
 FormValues = dict[str, Any]
 """Values of a form by option: a text, a choice or a list of names. The names in a list that the
@@ -23,7 +30,7 @@ _CHOICE, _MENU, _LETTER = 160, 46, 7
 
 
 def first_values(options: type) -> FormValues:
-    """Return the values of a form with the defaults.
+    """Return the initial values of a form: the defaults of the options.
 
     Args:
         options: dataclass of the options.
@@ -39,7 +46,9 @@ def first_values(options: type) -> FormValues:
 
 
 def form_texts(options: type, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the texts of options for `mbs.app.tasks.options.keywords`.
+    """Return the texts of options from the values of a form.
+
+    The texts are arguments of `mbs.app.tasks.options.keywords`.
 
     Args:
         options: dataclass of the options.
@@ -66,9 +75,7 @@ def option_form(
         offered: names that are offered for lists, if they are not those of the option.
         joint: joint in examples.
     """
-    kinds = value_kinds(options)
-    shown = {name: option for name, (_, option) in option_fields(options).items() if option.in_form}
-    lists = {name: option for name, option in shown.items() if kinds[name] == "names"}
+    lists = _options_in_form(options, "names")
     with ui.element("div").classes("app-form"):
         option_row(options, values)
     for name, option in lists.items():
@@ -87,18 +94,14 @@ def option_row(options: type, values: FormValues) -> None:
         options: dataclass of the options.
         values: values of the form, complete. They are updated while the user types.
     """
-    kinds = value_kinds(options)
-    shown = {name: option for name, (_, option) in option_fields(options).items() if option.in_form}
     choices: dict[str, ui.select] = {}
-    for name, option in shown.items():
-        if kinds[name] == "choice":
-            choices[name] = _choice(values, name, option)
-    for name, option in shown.items():
-        if kinds[name] == "number":
-            field = _text(values, name, FieldLook(title_of(name, option), _NUMBER, name))
-            if option.only_with is not None:
-                other, needed = option.only_with
-                field.bind_visibility_from(choices[other], "value", needed.__contains__)
+    for name, option in _options_in_form(options, "choice").items():
+        choices[name] = _choice(values, name, option)
+    for name, option in _options_in_form(options, "number").items():
+        field = _text(values, name, FieldLook(title_of(name, option), _NUMBER, name))
+        if option.only_with is not None:
+            other, needed = option.only_with
+            field.bind_visibility_from(choices[other], "value", needed.__contains__)
 
 
 def flags_field(options: type, values: FormValues, look: FieldLook) -> None:
@@ -109,9 +112,7 @@ def flags_field(options: type, values: FormValues, look: FieldLook) -> None:
         values: values of the form, complete. They are updated when the user chooses.
         look: appearance of the field.
     """
-    kinds = value_kinds(options)
-    shown = {name: option for name, (_, option) in option_fields(options).items() if option.in_form}
-    flags = {name: option.label or name for name, option in shown.items() if kinds[name] == "flag"}
+    flags = {n: option.label or n for n, option in _options_in_form(options, "flag").items()}
 
     def take(chosen: Sequence[str]) -> None:
         values.update({name: name in chosen for name in flags})
@@ -119,11 +120,23 @@ def flags_field(options: type, values: FormValues, look: FieldLook) -> None:
     several_field(look, flags, [name for name in flags if values[name]], take)
 
 
+def _options_in_form(options: type, kind: ValueKind) -> dict[str, OptionInfo]:
+    """Return the options of a dataclass that the form shows and that have a kind of values."""
+    kinds = value_kinds(options)
+    return {
+        name: option
+        for name, (_, option) in option_fields(options).items()
+        if option.in_form and kinds[name] == kind
+    }
+
+
 def _text(values: FormValues, key: str, look: FieldLook) -> ui.input:
+    """Create a text field that writes into `values[key]`."""
     return text_field(look, values[key], partial(values.__setitem__, key))
 
 
 def _choice(values: FormValues, name: str, option: OptionInfo) -> ui.select:
+    """Create a field for the choice of an option."""
     labels = {
         one: f"{one}, {word}" if word else one.replace("_", " ")
         for one, word in option.choices.items()
@@ -134,6 +147,10 @@ def _choice(values: FormValues, name: str, option: OptionInfo) -> ui.select:
 
 
 def _several(values: FormValues, name: str, option: OptionInfo, offered: Sequence[str]) -> None:
+    """Create a field for an option that is a list of names, which writes into `values[name]`.
+
+    `offered` are the names to choose from.
+    """
     values[name] = [one for one in values[name] if one in offered]
     labels = {one: one.replace("_", " ") for one in offered}
     look = FieldLook(title_of(name, option), "100%", name)

@@ -94,6 +94,7 @@ def kept_rows(columns: list[Array], most: int) -> NDArray[np.intp]:
 
 
 def _line(name: str, x: Array, y: Array) -> dict[str, Any]:
+    """Return the ECharts options of a line of values y over x (n,); NaN makes a gap."""
     points = [[a, b if b == b else None] for a, b in zip(x.tolist(), y.tolist(), strict=True)]
     return {
         "name": name,
@@ -106,6 +107,7 @@ def _line(name: str, x: Array, y: Array) -> dict[str, Any]:
 
 
 def _axis(title: str, *, below: bool = False) -> dict[str, Any]:
+    """Return the ECharts options of an axis; `below` is True for the time axis."""
     ends = {"min": "dataMin", "max": "dataMax"} if below else {"scale": True}
     return {
         "type": "value",
@@ -202,7 +204,7 @@ def several_field(
 
 
 def _named(field: ui.element, look: FieldLook) -> None:
-    """Add an accessible name to a field without label, for screen readers."""
+    """Add an accessible name for screen readers to a field without label."""
     if not look.label:
         field.props(f'aria-label="{look.marker}"')
 
@@ -239,7 +241,7 @@ _DONE: WeakSet[Client] = WeakSet()
 
 
 def add_look() -> None:
-    """Add these styles to the page, once."""
+    """Add the styles of panels with forms and plots to the page, once."""
     client = ui.context.client
     if client not in _DONE:
         _DONE.add(client)
@@ -247,5 +249,9 @@ def add_look() -> None:
 
 
 def come_into_view(element: ui.element) -> None:
-    """Scroll to an element, for pages that are too narrow to show it next to the form."""
+    """Scroll to an element, for pages that are too narrow to show it next to the form.
+
+    Args:
+        element: element of the page.
+    """
     ui.run_javascript(f"getHtmlElement({element.id})?.scrollIntoView({{block: 'nearest'}})")

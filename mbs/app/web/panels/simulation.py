@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from mbs.app.tasks.exporting import file_stem
 from mbs.app.tasks.simulation import Movie, SimulationSettings, csv_bytes, film
 from mbs.app.web.app import App
-from mbs.app.web.panels.layout import new_answer, tell_of_changes
+from mbs.app.web.panels.layout import new_answer, warn_of_changes
 from mbs.app.web.panels.options_form import first_values, form_texts, option_row
 from mbs.app.web.panels.plots import (
     FieldLook,
@@ -46,12 +46,22 @@ TYPED = "typed positions"
 
 
 def first_texts(texts: Mapping[str, str]) -> Texts:
-    """Return the texts of all fields: as typed before, else by default."""
+    """Return the texts of all fields of the form: as typed before, else by default.
+
+    Args:
+        texts: texts that were typed before, by field.
+    """
     return {"duration": "2", "start": PICTURE, **first_values(MotionOptions), **texts}
 
 
 def chosen_rows(system: System) -> list[Row]:
-    """Return the joints with start values and laws: the independent joints of a closed system."""
+    """Return the joints of the form, which have start values and laws.
+
+    They are the independent joints of a closed system, and all joints of an open one.
+
+    Args:
+        system: system to simulate.
+    """
     units = {c.name: c.unit for c in system.coordinates}
     speeds = [system.speeds[k] for k in system.active]
     return [(s.name, units.get(s.name, ""), s.unit, s.actuated) for s in speeds]
@@ -82,6 +92,7 @@ def settings_of(system: System, texts: Mapping[str, str], q: Sequence[float]) ->
 
 
 def _given(texts: Mapping[str, str], what: str, names: Sequence[str]) -> dict[str, str]:
+    """Return the nonempty texts of the fields "what.name", by name."""
     found = {name: texts.get(f"{what}.{name}", "").strip() for name in names}
     return {name: text for name, text in found.items() if text}
 
@@ -128,6 +139,11 @@ def build_form(system: System, texts: Texts) -> ui.button:
 
 
 def _joint(texts: Texts, start: ui.select, row: Row) -> None:
+    """Create the fields of a joint: start values, prescribed quantity and law.
+
+    They write into `texts`. The field of the position is enabled if `start` selects typed
+    positions.
+    """
     name, unit, rate, actuated = row
     ui.label(name).style("font-weight: 600").tooltip(f"position [{unit or 'none'}], rate [{rate}]")
     position = _text(texts, f"q0.{name}")
@@ -144,6 +160,7 @@ def _joint(texts: Texts, start: ui.select, row: Row) -> None:
 
 
 def _text(texts: Texts, key: str, label: str = "", width: str = "100%") -> ui.input:
+    """Create a text field that writes into `texts[key]`."""
     look = FieldLook(label, width, key)
     return text_field(look, texts.get(key, ""), partial(texts.__setitem__, key))
 
@@ -151,6 +168,7 @@ def _text(texts: Texts, key: str, label: str = "", width: str = "100%") -> ui.in
 def _choice(
     texts: Texts, key: str, options: Mapping[str, str], label: str = "", width: str = "100%"
 ) -> ui.select:
+    """Create a field for a choice that writes into `texts[key]`."""
     look = FieldLook(label, width, key)
     return choice_field(look, options, texts[key], partial(texts.__setitem__, key))
 
@@ -181,7 +199,7 @@ def groups_of(system: System, result: Result) -> dict[str, Charts]:
     groups: dict[str, Charts] = {title: {} for title in _KINDS.values()}
     groups |= {"Energy": {}, "Closure": {}, "Others": {}}
     for name, unit in result.units.items():
-        title, label = _place(name, joints)
+        title, label = _group_and_label(name, joints)
         groups[title].setdefault(unit, {})[label] = result[name]
     total = sum((result[name] for name in _ENERGIES), np.zeros(len(result)))
     groups["Energy"].setdefault("J", {})["total"] = total
@@ -190,8 +208,11 @@ def groups_of(system: System, result: Result) -> dict[str, Charts]:
     return {title: charts for title, charts in groups.items() if charts}
 
 
-def _place(name: str, joints: set[str]) -> tuple[str, str]:
-    """Return the group of a signal and the label of its line."""
+def _group_and_label(name: str, joints: set[str]) -> tuple[str, str]:
+    """Return the group of a signal, such as "Positions", and the label of its line.
+
+    `joints` are the names of all joint signals.
+    """
     if name in joints:
         stem, _, kind = name.rpartition(".")
         return _KINDS[kind], stem
@@ -214,7 +235,7 @@ _SPEEDS = {
 
 
 class Player:
-    """Player of a movie in the picture of the app: play, pause, and a slider over time."""
+    """Controls that play a movie in the picture: play, pause, speed, and a slider over time."""
 
     def __init__(self, app: App, film: Movie) -> None:
         self._app, self._film = app, film
@@ -229,7 +250,7 @@ class Player:
             self._slider = ui.slider(min=first, max=last, step=(last - first) / 1000, value=first)
             self._slider.style("flex: 1").mark("scrub")
             self._slider.on("update:model-value", self._scrub, throttle=0.05)  # [s] 20 pictures
-            self._label = ui.label(_told(first)).classes("app-note")
+            self._label = ui.label(_time_text(first)).classes("app-note")
             self._label.style("width: 62px; text-align: right; font-variant-numeric: tabular-nums")
             self._speed = ui.select(_SPEEDS, value=1.0, on_change=self._restart)
             self._speed.props("dense options-dense borderless").style("width: 118px")
@@ -255,6 +276,7 @@ class Player:
                 self._button.props("icon=play_arrow")
 
     async def _toggle(self) -> None:
+        """Play, or stop at the present time."""
         if self._playing:
             self.stop()
             await self._keep(float(self._slider.value))
@@ -262,13 +284,15 @@ class Player:
             await self.play()
 
     async def _restart(self) -> None:
+        """Play from the beginning if the movie is playing, with the new speed."""
         if self._playing:
             await self.play()
 
     async def _scrub(self, event: events.GenericEventArguments) -> None:
+        """Show the time to which the slider was moved."""
         self.stop()
         instant = float(event.args)
-        self._label.text = _told(instant)
+        self._label.text = _time_text(instant)
         await self._keep(instant)
 
     async def _keep(self, instant: float) -> None:
@@ -291,10 +315,11 @@ class Player:
             self.stop()
         elif self._playing:
             self._slider.set_value(instant)
-            self._label.text = _told(instant)
+            self._label.text = _time_text(instant)
 
 
-def _told(instant: float) -> str:
+def _time_text(instant: float) -> str:
+    """Return a time [s] as text."""
     return f"{instant:.2f} s"
 
 
@@ -304,7 +329,7 @@ _FILM = "simulated"
 
 
 def open_simulation(app: App) -> None:
-    """Open the panel for the present robot.
+    """Open the panel that simulates the present robot.
 
     Args:
         app: app of the page.
@@ -333,11 +358,12 @@ def open_simulation(app: App) -> None:
         finally:
             button.enable()
 
-    tell_of_changes(app, shown)
+    warn_of_changes(app, shown)
     button.on_click(run)
 
 
 async def _run(app: App, texts: Texts, shown: ui.element) -> None:
+    """Simulate the robot with the texts of the form, and show plots in `shown` and the motion."""
     system = app.checked_system()
     if system is None:
         return
@@ -384,6 +410,7 @@ def _show(app: App, system: System, made: Movie) -> Player:
 
 
 def _draw(made: Movie, charts: Charts) -> None:
+    """Show the charts of a group of signals."""
     height = 225 if len(charts) == 1 else 170
     for unit, series in charts.items():
         ui.echart(line_chart(made.result.time, series, unit)).style(
@@ -395,11 +422,11 @@ def _facts(system: System, made: Movie) -> None:
     """Show numbers that indicate the accuracy of the motion: energies and closure residual."""
     result = made.result
     energy = result["kinetic_energy"] + result["potential_energy"]
-    told = [
+    facts = [
         f"{len(result)} rows",
         f"energy goes from {energy[0]:.6g} to {energy[-1]:.6g} J",
     ]
     if system.is_closed:
-        told.append(f"loops open by {result['closure_residual'].max():.1e} at most")
-    told += [f"{name}: {words} at {instant:.4g} s" for instant, name, words in result.events[:4]]
-    ui.label("; ".join(told)).classes("app-note").mark("facts")
+        facts.append(f"loops open by {result['closure_residual'].max():.1e} at most")
+    facts += [f"{name}: {words} at {instant:.4g} s" for instant, name, words in result.events[:4]]
+    ui.label("; ".join(facts)).classes("app-note").mark("facts")

@@ -26,7 +26,9 @@ _TEXTS = PanelTexts(
 
 
 async def open_singular(app: App) -> None:
-    """Open the panel and factor the determinant with the options of the last time.
+    """Open the panel of singular configurations and factor the determinant.
+
+    The options are those that were last chosen.
 
     Args:
         app: app of the page.
@@ -41,6 +43,7 @@ async def open_singular(app: App) -> None:
 
 
 def _show(app: App, made: Singular) -> None:
+    """Show the determinant and its factors at the present position of the page."""
     ui.label(made.verdict).style("font-weight: 600").mark("verdict")
     rows, columns = ", ".join(made.rows), ", ".join(made.columns)
     ui.label(
@@ -52,6 +55,7 @@ def _show(app: App, made: Singular) -> None:
 
 
 def _factor(app: App, number: int, one: DeterminantFactor) -> None:
+    """Show factor `number` of the determinant with a button that moves the picture to its zero."""
     with in_a_row():
         show = ui.button("Show").props("flat no-caps dense").mark(f"show {number}")
         if one.configuration is None:

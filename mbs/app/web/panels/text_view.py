@@ -32,7 +32,13 @@ def text_view(app: App, text: str, file_name: str, height: str = "420px") -> Non
 
 
 def text_buttons(app: App, text: str, file_name: str) -> None:
-    """Create buttons that copy a text and download it as a file."""
+    """Create buttons that copy a text and download it as a file.
+
+    Args:
+        app: app of the page.
+        text: text.
+        file_name: name of the downloaded file.
+    """
 
     def copy() -> None:
         ui.clipboard.write(text)
@@ -51,6 +57,7 @@ def text_buttons(app: App, text: str, file_name: str) -> None:
 
 
 def _lines(text: str) -> str:
+    """Return the number of lines of a text, such as "3 lines"."""
     count = len(text.splitlines())
     return f"{count} line{'s' if count != 1 else ''}"
 
@@ -95,7 +102,11 @@ def count_table(counts: Mapping[str, Count]) -> None:
 
 
 def steps_table(steps: Sequence[Step]) -> None:
-    """Show a table of the passes of the optimizer, in the order in which they were applied."""
+    """Show a table of the passes of the optimizer with operation counts and times.
+
+    Args:
+        steps: passes in the order in which they were applied.
+    """
     columns = [
         column("name", "pass", "left"),
         column("before", "before"),
@@ -118,7 +129,7 @@ def steps_table(steps: Sequence[Step]) -> None:
 def plain_table(
     columns: Sequence[dict[str, Any]], rows: Sequence[dict[str, Any]], key: str
 ) -> ui.table:
-    """Create a dense table.
+    """Create a dense table at the present position.
 
     Args:
         columns: column definitions, see `column`.

@@ -40,6 +40,10 @@ def test_saved_states_continue_bit_for_bit(fmu):
         each.freeInstance()
 
 
+NAMES = ("NU", "NY", "NP", "NM", "NZ", "NK", "NCUT")
+"""Numbers of variables in model.h, besides states and derivatives."""
+
+
 def test_bytes_that_are_no_state_are_refused(fmu):
     """Offsets are those of `core_memory`: run, variables, inputs, configuration, solver."""
     instance = fmu.open(FMU2Slave, tolerance=TOLERANCE)
@@ -49,10 +53,10 @@ def test_bytes_that_are_no_state_are_refused(fmu):
     values = fmu.get(instance, *[v.name for v in fmu.description.modelVariables][:2])
     at = len(blob.split(values.tobytes())[0])  # the values of the variables
     header = Path(fmu.folder, "sources", "model.h").read_text()
-    size = {name: int(n) for name, n in re.findall(r"#define (N\w) (\d+)", header)}
-    count = 2 * size["NX"] + sum(size[name] for name in ("NU", "NY", "NP", "NM", "NZ", "NK"))
+    size = {name: int(n) for name, n in re.findall(r"#define (N\w+) (\d+)", header)}
+    count = 2 * size["NX"] + sum(size[name] for name in NAMES)
     mode, time, stale = at - 32, at - 24, at - 8
-    inputs = at + 8 * (count + 1 + size["NZ"] + 1)
+    inputs = at + 8 * (count + 1 + size["NZ"] + 1 + size["NCUT"] + 1)
     known = inputs + 8 * (2 + 3 * size["NU"] + 1)
     tolerance = len(blob.split(np.float64(TOLERANCE).tobytes())[0])
     assert struct.unpack_from("=2i", blob, mode) == (16, 1)

@@ -68,7 +68,7 @@ class Ours:
     def __init__(self, system: Any, method: str) -> None:
         state = full_state(system)
         self.x0 = np.concatenate(
-            [*configuration(system, start(HEIGHT), None, None), system.z_start]
+            [*configuration(system, start(HEIGHT), None, None), system.component_start]
         )
         self.events, (rhs, project, _) = with_crossings(state, self.x0, (0.0, DURATION), (), ())
         self.functions = equations(rhs, project, method, self.events)

@@ -101,12 +101,12 @@ def fingerprint(name: str, base: bool = False) -> dict[str, Any]:
 def _closure(system: System) -> dict[str, Any]:
     if system.closure is None:
         return {}
-    speeds = [speed.name for speed in system.speeds]
+    speeds = [speed.name for speed in system.velocity_coordinates]
     return {
         "kept": [list(system.closure.rows), list(system.closure.slips)],
-        "independent": [speeds[k] for k in system.closure.active],
+        "independent": [speeds[k] for k in system.closure.independent],
         "passive": [speeds[k] for k in system.closure.passive],
-        "free": [speeds[k] for k in system.closure.free],
+        "free": [speeds[k] for k in system.closure.chosen_coordinates],
         "varies": system.closure.varies,
     }
 

@@ -133,7 +133,7 @@ def _measured(name: str, case: Case, folder: Path) -> str:
 
 
 def _motors(system: mbs.System) -> list[int]:
-    return [k for k in system.active if system.speeds[k].actuated]
+    return [k for k in system.independent if system.velocity_coordinates[k].actuated]
 
 
 def _ends(system: mbs.System, case: Case) -> list[float]:
@@ -164,7 +164,8 @@ def imported(path: Path, system: mbs.System, case: Case, kind: str) -> np.ndarra
         path,
         case.seconds,
         inputs={
-            f"{system.speeds[k].name}.tau": (ramp, end * ramp / case.seconds) for k, end in ends
+            f"{system.velocity_coordinates[k].name}.tau": (ramp, end * ramp / case.seconds)
+            for k, end in ends
         },
         kind=kind,
         step=case.seconds / ROWS,

@@ -251,8 +251,8 @@ def _calls(case: Case, duration: float, tolerance: float) -> Iterator[Callable[[
     yield lambda: whole(duration, **given)
     yield lambda: one(duration, **given)
     # starts that differ from call to call
-    speed = system.speeds[system.active[0]].name
-    first = system.velocity(case.v0)[system.active[0]]
+    speed = system.velocity_coordinates[system.independent[0]].name
+    first = system.velocity(case.v0)[system.independent[0]]
     others = ({**(case.v0 or {}), speed: first + 1e-4 * k} for k in itertools.count(1))
     yield lambda: whole(duration, tolerance=tolerance, v0=next(others))
 

@@ -73,7 +73,11 @@ def arm(folder: Path) -> tuple[Function, Path, list[str]]:
     file = folder / "panda_like.urdf"
     file.write_text(urdf("panda_like", panda_like()), encoding="utf-8")
     system = mbs.load(str(file)).assemble()
-    return mbs.models.inverse_dynamics(system), file, [row.joint for row in system.speeds]
+    return (
+        mbs.models.inverse_dynamics(system),
+        file,
+        [row.joint for row in system.velocity_coordinates],
+    )
 
 
 def print_counts(contenders: dict[str, Function]) -> None:

@@ -81,7 +81,7 @@ def starts(
         tolerance = (
             10 ** rng.uniform(-10, -3) if tolerances is None else tolerances[k % len(tolerances)]
         )
-        names = [system.speeds[j].name for j in system.active]
+        names = [system.velocity_coordinates[j].name for j in system.independent]
         configuration = dict(
             zip((c.name for c in system.coordinates), system.configuration, strict=True)
         )

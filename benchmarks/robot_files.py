@@ -154,7 +154,7 @@ class _State:
         self.joints = joints
         self.velocities: list[int] = []
         seen: Counter[str] = Counter()
-        for speed in system.speeds:
+        for speed in system.velocity_coordinates:
             joint = joints[speed.joint]
             self.velocities.append(joint.idx_v + seen[speed.joint])
             seen[speed.joint] += 1

@@ -49,7 +49,7 @@ def pins(q):
 # %% The least effort in 1.5 s, above the wall in the middle
 STAGES, DURATION, WALL = 20, 1.5, 0.8
 TORQUE = np.array([2500, 2500, 400, 200, 100, 2500.0])
-active = list(system.active)
+active = list(system.independent)
 ends = [np.concatenate([q[active], np.zeros(6)]) for q in (PICK, PLACE)]
 
 clock = time.perf_counter()

@@ -48,8 +48,8 @@ for leg, (x, y) in HIPS.items():
     m.connect(upper.at(0, 0, -LEG), Revolute(f"{leg}_knee", axis="y"), lower)
     m.add_frame(f"{leg}_foot", lower.at(0, 0, -LEG))
 system = m.assemble()
-names = [speed.name for speed in system.speeds]
-motors = [k for k, speed in enumerate(system.speeds) if speed.actuated]
+names = [speed.name for speed in system.velocity_coordinates]
+motors = [k for k, speed in enumerate(system.velocity_coordinates) if speed.actuated]
 size, legs = len(names), len(HIPS)
 
 # %% One set of feet; each phase holds some of them, with the same inputs and outputs

@@ -30,3 +30,23 @@ def moved(module: str, names: Mapping[str, str]) -> Callable[[str], Any]:
         return getattr(importlib.import_module(place), present)
 
     return get
+
+
+class RenamedAttribute:
+    """Old name of an attribute of a class. Its use gives the value of the new name and a warning.
+
+    Args:
+        present: new name of the attribute or method.
+    """
+
+    def __init__(self, present: str) -> None:
+        self.present = present
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        """Record the class and the old name."""
+        self.text = f"{owner.__name__}.{name} is now {owner.__name__}.{self.present}"
+
+    def __get__(self, instance: Any, owner: type | None = None) -> Any:
+        """Return the attribute under its new name."""
+        warnings.warn(f"{self.text}; change the name", DeprecationWarning, stacklevel=2)
+        return getattr(owner if instance is None else instance, self.present)

@@ -4,6 +4,8 @@ import importlib
 
 import pytest
 
+import mbs
+
 RENAMED = {
     "mbs.components.Mechanism": "mbs.Mechanism",
     "mbs.components.Placed": "mbs.components.SubMechanism",
@@ -44,3 +46,29 @@ def test_an_old_name(old, new):
 def test_an_unknown_name():
     with pytest.raises(AttributeError, match=r"module 'mbs\.components' has no attribute 'Gadget'"):
         found("mbs.components.Gadget")
+
+
+ATTRIBUTES = {
+    "active": "independent",
+    "free": "chosen_coordinates",
+    "speeds": "velocity_coordinates",
+    "described": "parameterised_components",
+    "content": "fingerprint",
+    "recent": "memoised",
+    "z": "component_states",
+    "z_start": "component_start",
+}
+"""Attributes of a System in version 0.1 and their present names."""
+
+
+@pytest.mark.parametrize(("old", "new"), ATTRIBUTES.items())
+def test_an_old_attribute_of_a_system(old, new):
+    system = mbs.load("four_bar").assemble()
+    with pytest.warns(DeprecationWarning, match=rf"System\.{old} is now System\.{new}"):
+        value = getattr(system, old)
+    assert str(value) == str(getattr(system, new))
+
+
+def test_the_old_name_of_connect_signal():
+    with pytest.warns(DeprecationWarning, match=r"Description\.wire is now Description\.connect"):
+        assert mbs.Mechanism.wire is mbs.Mechanism.connect_signal

@@ -105,7 +105,7 @@ def connections(system: SystemData) -> Connections:
 def _edge(system: SystemData, k: int) -> ConnectionEdge:
     """Return joint k of the system as an edge of the graph."""
     row = system.joints[k]
-    speeds = (*system.speeds, *system.cut_coordinates)
+    speeds = (*system.velocity_coordinates, *system.cut_coordinates)
     driven = any(speed.actuated for speed in speeds if speed.joint == row.name)
     ends = row.frame_a[0] + 1, row.frame_b[0] + 1
     return ConnectionEdge(row.name, _KINDS.get(row.kind, row.kind), driven, row.cut, ends)

@@ -88,8 +88,8 @@ def _limits(system: System, name: str) -> dict[str, str]:
     """Return the text of the limits of each element of an input, by name of the element."""
     ranges = {
         "q": [(row.name, row.limits) for row in system.coordinates],
-        "v": [(row.name, row.limits) for row in system.speeds],
-        "tau": [(row.name, row.effort) for row in system.speeds],
+        "v": [(row.name, row.limits) for row in system.velocity_coordinates],
+        "tau": [(row.name, row.effort) for row in system.velocity_coordinates],
     }
     return {
         element: f" {ends[0]:g} .. {ends[1]:g}"
@@ -582,7 +582,7 @@ def signals_in(system: System, inputs: Named, outputs: Named) -> Named:
         outputs: named outputs of the model.
     """
     given = {name for name, _ in inputs}
-    found = [("z", system.z), ("u", system.u)]
+    found = [("z", system.component_states), ("u", system.u)]
     needed = casadi.veccat(*(value for _, value in outputs))
     return [
         (name, symbols)
@@ -626,14 +626,14 @@ def require_system(system: object) -> None:
 def _elements(system: System) -> dict[str, list[tuple[str, str]]]:
     """Return lists of (name, unit) of elements, by the name of each input or output of models."""
     q = [(coordinate.name, coordinate.unit) for coordinate in system.coordinates]
-    free = [system.speeds[k] for k in system.free]
+    free = [system.velocity_coordinates[k] for k in system.chosen_coordinates]
     units = {"v": _SAME_UNIT, "a": ACCELERATION_UNIT, "tau": EFFORT_UNIT}
     result = {"q": q, "p": [(parameter.name, parameter.unit) for parameter in system.parameters]}
     result["q_a"] = [(speed.name, speed.unit.removesuffix("/s")) for speed in free]
     for name, unit in units.items():
-        every = [(speed.name, unit[speed.unit]) for speed in system.speeds]
+        every = [(speed.name, unit[speed.unit]) for speed in system.velocity_coordinates]
         result[name] = every
-        result[f"{name}_a"] = [every[k] for k in system.active]
+        result[f"{name}_a"] = [every[k] for k in system.independent]
     result["tau_m"] = [result["tau"][k] for k in system.motors]
     result |= {"z": list(system.states), "u": list(system.inputs), "y": list(system.outputs)}
     return result

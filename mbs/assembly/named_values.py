@@ -111,7 +111,7 @@ def velocity_of(
         ModelError: a name is unknown, or a value is not a finite number.
     """
     given = plain_names(system, values, VELOCITIES)
-    return _filled(system, given, system.speeds, [0.0] * system.nv, "velocity")
+    return _filled(system, given, system.velocity_coordinates, [0.0] * system.nv, "velocity")
 
 
 def effort_of(
@@ -127,7 +127,7 @@ def effort_of(
         ModelError: a name is unknown, or a value is not a finite number.
     """
     given = plain_names(system, values, EFFORTS)
-    return _filled(system, given, system.speeds, [0.0] * system.nv, "effort")
+    return _filled(system, given, system.velocity_coordinates, [0.0] * system.nv, "effort")
 
 
 def plain_names(system: SystemData, values: Any, kinds: Collection[str]) -> Any:
@@ -143,7 +143,7 @@ def plain_names(system: SystemData, values: Any, kinds: Collection[str]) -> Any:
     """
     if not isinstance(values, Mapping):
         return values
-    rows = (*system.coordinates, *system.cut_coordinates, *system.speeds)
+    rows = (*system.coordinates, *system.cut_coordinates, *system.velocity_coordinates)
     return by_coordinate(system.name, values, {row.name for row in rows}, kinds)
 
 
@@ -280,7 +280,7 @@ def parameter_fault(system: SystemData, p: Iterable[float]) -> str:
         if not math.isnan(value)
     }
     links = {row.name: row.link - 1 for row in system.bodies}
-    for component in system.described:
+    for component in system.parameterised_components:
         try:
             checked = component.check_values(values)
             if isinstance(checked, RigidBody):

@@ -103,10 +103,10 @@ def open_system(mechanism: Description, guessed: Collection[str] = ()) -> System
         parameters=parameters,
         bounds=bounds,
         bounded=tuple(bounded_fields(described, symbols)),
-        described=tuple(described),
+        parameterised_components=tuple(described),
         p=casadi.vertcat(*symbols.values()) if symbols else SX(0, 1),
         coordinates=coordinates,
-        speeds=speeds,
+        velocity_coordinates=speeds,
         cut_coordinates=cut,
         bodies=_bodies(mechanism, graph, framed),
         frames=frames,
@@ -115,7 +115,9 @@ def open_system(mechanism: Description, guessed: Collection[str] = ()) -> System
         loops=_loop_rows(mechanism, framed, parts),
         configuration=tuple(zero_position(framed.tree)),
         parts=parts,
-        z=symbols_in_order(symbol for part in parts for symbol in part.states.values()),
+        component_states=symbols_in_order(
+            symbol for part in parts for symbol in part.states.values()
+        ),
         u=symbols_in_order(
             given for part in parts for given in part.inputs.values() if isinstance(given, SX)
         ),

@@ -105,13 +105,13 @@ def _loops(system: SystemData) -> list[str]:
             )
         else:
             lines.append("  The cut forces are unique.")
-    active = ", ".join(system.speeds[k].name for k in closure.active) or "none"
+    active = ", ".join(system.velocity_coordinates[k].name for k in closure.independent) or "none"
     lines.append(
         f"Mobility {closure.mobility} (Gruebler-Kutzbach counts {closure.gruebler});"
         f" independent: {active}."
     )
-    if closure.motors != closure.active:
-        motors = ", ".join(system.speeds[k].name for k in closure.motors)
+    if closure.motors != closure.independent:
+        motors = ", ".join(system.velocity_coordinates[k].name for k in closure.motors)
         lines.append(f"Driven by {_count(len(closure.motors), 'effort')}: {motors}.")
     if len(closure.motors) > closure.mobility:
         lines.append("  They are more than the mobility: which of them carries a load is a choice.")
@@ -147,7 +147,7 @@ def _configuration(system: SystemData, closure: Closure) -> list[str]:
             " positions to choose another branch."
         )
     if closure.dead:
-        names = ", ".join(system.speeds[k].name for k in closure.active)
+        names = ", ".join(system.velocity_coordinates[k].name for k in closure.independent)
         lines.append(
             f"  The configuration is a dead centre of {names}: the other joints do not follow"
             f" from {names} there, and models in independent joints have no value. Guess another"

@@ -17,6 +17,7 @@ from mbs.assembly.pickling import Packed, content_of, packed, unpacked
 from mbs.assembly.report import report
 from mbs.assembly.system_data import SystemData
 from mbs.assembly.tree import position_rate
+from mbs.deprecation import RenamedAttribute
 from mbs.errors import ModelError
 from mbs.files import PathLike
 from mbs.spatial import Pose
@@ -33,6 +34,15 @@ class System(SystemData):
     """
 
     _cache: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    active = RenamedAttribute("independent")
+    free = RenamedAttribute("chosen_coordinates")
+    speeds = RenamedAttribute("velocity_coordinates")
+    described = RenamedAttribute("parameterised_components")
+    content = RenamedAttribute("fingerprint")
+    recent = RenamedAttribute("memoised")
+    z = RenamedAttribute("component_states")
+    z_start = RenamedAttribute("component_start")
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return the pickle. It contains everything except the models, which are built again.
@@ -101,7 +111,7 @@ class System(SystemData):
                 self._cache[key] = build()
             return self._cache[key]
 
-    def content(self) -> Packed | None:
+    def fingerprint(self) -> Packed | None:
         """Return a pickle that identifies the content of the system in all processes, cached.
 
         Returns:
@@ -116,7 +126,7 @@ class System(SystemData):
         content: Packed | None = self.cached("content", build)
         return content
 
-    def recent(self, kind: str, key: Any, build: Callable[[], Any], most: int) -> Any:
+    def memoised(self, kind: str, key: Any, build: Callable[[], Any], most: int) -> Any:
         """Return the value of a key from a cache that contains the last few values of a kind.
 
         Args:

@@ -43,7 +43,7 @@ class SystemData:
         parameters: parameters in the order of the input p of the Functions.
         p: (np, 1) symbols of the parameters.
         coordinates: elements of q.
-        speeds: elements of v, and of efforts and accelerations.
+        velocity_coordinates: elements of v, and of efforts and accelerations.
         cut_coordinates: coordinates of the cut joints. They are not elements of q.
         bodies: moving bodies of the description, in the order of external wrenches.
         frames: link (-1 for the base) and pose in the frame of the link, by name of the frame.
@@ -56,11 +56,11 @@ class SystemData:
         joints: all joints and constraints of the tree and of the cuts.
         sensors: sensors, which do not change the motion.
         shafts: inertias and rigid gears of drive lines, with the coordinates of their rotation.
-        z: (nz, 1) symbols of the states of parts.
+        component_states: (nz, 1) symbols of the states of parts.
         u: (nu, 1) symbols of the inputs of parts.
         bounds: lower and upper bound of parameters, by name of the parameter.
         bounded: quantities that are computed from parameters and have bounds.
-        described: components that contain parameters, as in the description.
+        parameterised_components: components that contain parameters, as in the description.
         numbered: name of the body of each frame of the table from which the mechanism was made, by
             the number in the table; empty if the numbers are those of the links.
         shapes: shapes of the links and of the base.
@@ -77,7 +77,7 @@ class SystemData:
     parameters: tuple[Parameter, ...]
     p: SX
     coordinates: tuple[Coordinate, ...]
-    speeds: tuple[Coordinate, ...]
+    velocity_coordinates: tuple[Coordinate, ...]
     cut_coordinates: tuple[Coordinate, ...]
     bodies: tuple[BodyRow, ...]
     frames: Mapping[str, tuple[int, Pose]]
@@ -89,11 +89,11 @@ class SystemData:
     joints: tuple[JointRow, ...] = ()
     sensors: tuple[AttachedSensor, ...] = ()
     shafts: tuple[ShaftRow, ...] = ()
-    z: SX = field(default_factory=lambda: SX(0, 1))
+    component_states: SX = field(default_factory=lambda: SX(0, 1))
     u: SX = field(default_factory=lambda: SX(0, 1))
     bounds: Mapping[str, Bounds] = field(default_factory=dict)
     bounded: tuple[BoundedField, ...] = ()
-    described: tuple[Component, ...] = ()
+    parameterised_components: tuple[Component, ...] = ()
     numbered: Mapping[int, str] = field(default_factory=dict)
     shapes: tuple[ShapeRow, ...] = ()
     nodes: tuple[tuple[int, int], ...] = ()
@@ -116,7 +116,7 @@ class SystemData:
 
     @property
     def states(self) -> tuple[Quantity, ...]:
-        """Names and units of the elements of z, the states of parts."""
+        """Names and units of the elements of `component_states`."""
         return tuple(row for part in self.parts for row in part.state_quantities)
 
     @property
@@ -130,8 +130,8 @@ class SystemData:
         return tuple(row for part in self.parts for row in part.output_quantities)
 
     @property
-    def z_start(self) -> list[float]:
-        """(nz,) start values of z from the components."""
+    def component_start(self) -> list[float]:
+        """(nz,) start values of `component_states` from the components."""
         return [getattr(part.element, name) for part in self.parts for name in part.states]
 
     @property
@@ -155,27 +155,27 @@ class SystemData:
         return self.closure is not None
 
     @property
-    def active(self) -> tuple[int, ...]:
+    def independent(self) -> tuple[int, ...]:
         """Indices of the independent velocities. All velocities of an open chain are independent.
 
         These are the velocities that models of a closed system take. `actuated` has the velocities
         with motors.
         """
-        return self.closure.active if self.closure else tuple(range(self.nv))
+        return self.closure.independent if self.closure else tuple(range(self.nv))
 
     @property
     def actuated(self) -> tuple[int, ...]:
         """Indices of the velocities whose joints have motors."""
-        return tuple(k for k, speed in enumerate(self.speeds) if speed.actuated)
+        return tuple(k for k, speed in enumerate(self.velocity_coordinates) if speed.actuated)
 
     @property
-    def free(self) -> tuple[int, ...]:
+    def chosen_coordinates(self) -> tuple[int, ...]:
         """Indices of the velocities whose positions may be chosen independently.
 
-        They equal `active`, unless discs roll without slip: then more positions than velocities are
-        independent.
+        They equal `independent`, unless discs roll without slip: then more positions than
+        velocities are independent.
         """
-        return self.closure.free if self.closure else tuple(range(self.nv))
+        return self.closure.chosen_coordinates if self.closure else tuple(range(self.nv))
 
     @property
     def node_frictions(self) -> frozenset[str]:
@@ -186,7 +186,7 @@ class SystemData:
     def motors(self) -> tuple[int, ...]:
         """Indices of the velocities whose efforts are inputs and outputs of the dynamic models.
 
-        They equal `active` unless there are more motors or motors depend on each other.
+        They equal `independent` unless there are more motors or motors depend on each other.
         """
         return self.closure.motors if self.closure else tuple(range(self.nv))
 

@@ -201,12 +201,12 @@ class Closure:
     Attributes:
         rows: indices of the independent closure rows.
         slips: indices of the independent rows on velocities only, such as those of rolling discs.
-        active: indices of the independent velocities.
+        independent: indices of the independent velocities.
         passive: indices of the dependent velocities.
         motors: indices of the velocities whose efforts drive the mechanism: the independent
             velocities, or the motors if there are more motors, or others.
-        free: indices of the velocities whose positions may be chosen: the independent velocities,
-            and velocities that only rolling without slip constrains.
+        chosen_coordinates: indices of the velocities whose positions may be chosen: the
+            independent velocities, and velocities that only rolling without slip constrains.
         varies: Whether the relation between dropped and kept rows changes with the configuration,
             so that other rows may be independent in other configurations.
         gruebler: mobility by the Gruebler-Kutzbach count of rows.
@@ -221,10 +221,10 @@ class Closure:
 
     rows: tuple[int, ...]
     slips: tuple[int, ...]
-    active: tuple[int, ...]
+    independent: tuple[int, ...]
     passive: tuple[int, ...]
     motors: tuple[int, ...]
-    free: tuple[int, ...]
+    chosen_coordinates: tuple[int, ...]
     varies: bool
     gruebler: int
     residual: float
@@ -237,7 +237,7 @@ class Closure:
     @property
     def mobility(self) -> int:
         """Number of independent velocities."""
-        return len(self.active)
+        return len(self.independent)
 
 
 def link_rows(tree: Tree) -> tuple[LinkRow, ...]:

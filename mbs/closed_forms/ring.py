@@ -65,7 +65,7 @@ def spin_indices(system: System) -> dict[int, int]:
     spherical = [
         link.q.start
         for link in system.tree.links
-        for k in system.free
+        for k in system.chosen_coordinates
         if link.motion is Motion.SPHERICAL and link.v.start <= k < link.v.stop
     ]
     first = cut_indices(system)[-1]
@@ -82,7 +82,7 @@ def extent(system: System) -> int:
 
 
 def independent_indices(system: System) -> list[int]:
-    """Return the position indices of the independent joints, in the order of `system.free`.
+    """Return the position indices of the joints in the order of `system.chosen_coordinates`.
 
     Args:
         system: system with closed loops.
@@ -91,7 +91,7 @@ def independent_indices(system: System) -> list[int]:
         NoClosedForm: a body is free, or a spherical joint has more than one independent rotation.
     """
     spins, indices = spin_indices(system), list[int]()
-    for k in system.free:
+    for k in system.chosen_coordinates:
         link = next(link for link in system.tree.links if link.v.start <= k < link.v.stop)
         index = link.q.start if link.motion.nq == 1 else spins.get(link.q.start)
         if index is None or index in indices:

@@ -1,8 +1,8 @@
 """Signal blocks: controllers, filters, limits and sums between sensors and actuators.
 
-A block has inputs and outputs, which `Mechanism.wire` connects, and no position in the mechanism.
-Most blocks are continuous in time; sampled blocks have events. Signals of blocks have the unit 1:
-a block is independent of the unit of its signals.
+A block has inputs and outputs, which `Mechanism.connect_signal` connects, and no position in the
+mechanism. Most blocks are continuous in time; sampled blocks have events. Signals of blocks have
+the unit 1: a block is independent of the unit of its signals.
 """
 
 from __future__ import annotations

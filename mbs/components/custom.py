@@ -197,7 +197,7 @@ def output(unit: str = "1") -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """An input or output of a component, as an argument of `Mechanism.wire`.
+    """An input or output of a component, as an argument of `Mechanism.connect_signal`.
 
     Attributes:
         owner: component that has the signal.

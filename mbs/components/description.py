@@ -34,6 +34,7 @@ from mbs.components.motion_joint import MotionJoint
 from mbs.components.notes import ImportNote
 from mbs.components.sensors import Sensor
 from mbs.components.shapes import Shape
+from mbs.deprecation import RenamedAttribute
 from mbs.errors import AssemblyError, DescriptionError
 from mbs.expressions import Parameter, Scalar, expression, parameters_of
 from mbs.text import did_you_mean, quoted
@@ -398,7 +399,9 @@ class Description:
             )
         self._weld(self._point(a), self._point(joint_or_point))
 
-    def wire(self, source: Signal | str, target: Signal | str) -> None:
+    wire = RenamedAttribute("connect_signal")
+
+    def connect_signal(self, source: Signal | str, target: Signal | str) -> None:
         """Connect an input of a component to an output, a state or a sensor reading.
 
         Components that are not in the mechanism yet are added.

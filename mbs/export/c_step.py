@@ -322,7 +322,7 @@ def _header(
 
     `sizes` are the C constants, `words` the names that the text template contains.
     """
-    speeds = system.speeds
+    speeds = system.velocity_coordinates
     texts = {
         "x": _words((v.name, v.unit) for v in variables.x),
         "z": _words((v.name.removesuffix(".solved"), v.unit) for v in variables.z),

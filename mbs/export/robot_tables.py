@@ -99,7 +99,7 @@ def robot_table(system: System, file: str = ".par") -> RobotTable:
         for frame in link.via:
             frames.append(FrameRow(before, 2, None, **_geometry(frame, text)))
             before = len(frames)
-        motor = system.speeds[j].actuated
+        motor = system.velocity_coordinates[j].actuated
         kind = _SIGMA[link.motion]
         frames.append(FrameRow(before, kind, motor, **_geometry(link.placement, text)))
         number[j] = len(frames)
@@ -375,7 +375,7 @@ class _Tables:
         body = self.body_of(j, link)
         own = self.pose(system.frames[body][1] if body else Pose.identity())
         self.frames[j] = own
-        speed = system.speeds[link.v.start]
+        speed = system.velocity_coordinates[link.v.start]
         before = self.frames[link.antecedent]
         return FileLink(
             name=link.name,
@@ -437,7 +437,7 @@ class _Tables:
             quantities["length"] = (element.length,)
         if isinstance(element, FixedTendon):
             quantities |= {"length": tuple(element.length), "friction": (element.friction,)}
-            names = [speed.name for speed in self.system.speeds]
+            names = [speed.name for speed in self.system.velocity_coordinates]
             levers = {
                 names[lever.velocity]: self.number.scalar(lever.factor) for lever in part.levers
             }

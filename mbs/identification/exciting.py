@@ -729,11 +729,11 @@ def _with_smooth_friction(system: System, limits: MotionLimits, form: FourierSet
     or, without a limit, from the position range and the period in `form`.
     """
     widths = {}
-    rows = zip(system.active, limits.position, limits.velocity, strict=True)
+    rows = zip(system.independent, limits.position, limits.velocity, strict=True)
     for k, position, velocity in rows:
         span = np.pi * (position.upper - position.lower) / form.period
         fastest = velocity.upper if velocity.is_finite else span
-        widths[system.speeds[k].name] = SX(_SIGN_PART * fastest)
+        widths[system.velocity_coordinates[k].name] = SX(_SIGN_PART * fastest)
     links = tuple(
         replace(link, Fs_width=widths.get(link.name, link.Fs_width)) for link in system.tree.links
     )
@@ -749,7 +749,7 @@ def _check(system: System, objective: str, starts: int, rounds: int) -> None:
     for name, number in {"starts": starts, "rounds": rounds}.items():
         if number < 1:
             raise ModelError(f"excitation: {number} {name} give no motion; give 1 or more")
-    if tuple(system.free) != tuple(system.active):
+    if tuple(system.chosen_coordinates) != tuple(system.independent):
         raise ModelError(
             f"{system.name}: some independent joints have velocities alone, such as discs that"
             " roll; excitation is for positions that are independent too"

@@ -134,7 +134,7 @@ def _determinant(A: SX) -> SX:
 
 
 def active_indices(system: System) -> list[int]:
-    """Return the indices in q of the independent joints, in the order of `system.active`.
+    """Return the indices in q of the independent joints, in the order of `system.independent`.
 
     Args:
         system: open or closed.
@@ -143,7 +143,7 @@ def active_indices(system: System) -> list[int]:
         ModelError: an independent velocity is not the derivative of one position.
     """
     links, indices = system.tree.links, []
-    for k in system.active:
+    for k in system.independent:
         link = next(link for link in links if link.v.start <= k < link.v.stop)
         if link.motion.nq != 1:
             raise ModelError(
@@ -238,6 +238,6 @@ def positions(system: System, q_a: Array) -> Array:
     """
     if not system.is_closed:
         return q_a
-    x = MX.sym("q_a", len(system.active))
+    x = MX.sym("q_a", len(system.independent))
     follow = Function("positions", [x], [configuration_of(system, x)])
     return np.asarray(DM(follow.map(len(q_a))(q_a.T))).T

@@ -55,7 +55,7 @@ def regular_rows(system: System, q: Array) -> Chosen:
     """
     good = regular(system, q)
     if good.mean() < _FEWEST:
-        names = ", ".join(system.speeds[k].name for k in system.active)
+        names = ", ".join(system.velocity_coordinates[k].name for k in system.independent)
         raise ModelError(
             f"{system.name}: {100 * (1 - good.mean()):.0f} % of the record is next to singular"
             f" configurations, where {names} do not lead the other joints; record a motion that"
@@ -136,7 +136,7 @@ def motion_of(model: Any, samples: Samples) -> tuple[Array, Array, Array]:
     width, m = samples.q.shape[1], int(model.size1_in(1))
     if samples.tau.shape[1] == m:
         if width == system.nq == system.nv:
-            chosen = list(system.active) if _is_reduced(model) else list(range(m))
+            chosen = list(system.independent) if _is_reduced(model) else list(range(m))
             return samples.q, samples.v[:, chosen], samples.a[:, chosen]
         if width == m and _is_reduced(model):
             return positions(system, samples.q), samples.v, samples.a

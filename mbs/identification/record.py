@@ -426,11 +426,11 @@ class Record:
         """
         require_system(system)
         width = np.shape(q)[1] if np.ndim(q) == 2 else system.nq
-        alone = system.is_closed and width == len(system.active) != system.nq
+        alone = system.is_closed and width == len(system.independent) != system.nq
         indices = active_indices(system) if alone else range(system.nq)
         joints = [system.coordinates[k] for k in indices]
         _check_joints(system, joints, width)
-        speeds = [system.speeds[k] for k in system.active]
+        speeds = [system.velocity_coordinates[k] for k in system.independent]
         _check_efforts(system, [c.name for c in speeds], tau)
         described = {
             "names": tuple(c.name for c in joints),
@@ -597,8 +597,8 @@ def _check_joints(system: System, joints: Sequence[Coordinate], width: int) -> N
 
 def _check_motors(system: System) -> None:
     """Raise ModelError unless the motors of a system are at its independent joints."""
-    if system.motors != system.active:
-        motors = ", ".join(system.speeds[k].name for k in system.motors)
+    if system.motors != system.independent:
+        motors = ", ".join(system.velocity_coordinates[k].name for k in system.motors)
         raise ModelError(
             f"{system.name}: its motors ({motors}) are not its independent joints; give Record.of"
             " the efforts that mbs.models.actuation_matrix makes of theirs"

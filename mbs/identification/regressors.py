@@ -396,7 +396,7 @@ def _rotor_kinds(system: System, link: Link) -> list[str]:
 
     "Ia" is included if it is nonzero or the joint is actuated without an own rotor.
     """
-    driven = system.speeds[link.v.start].actuated and link.rotor is None
+    driven = system.velocity_coordinates[link.v.start].actuated and link.rotor is None
     kinds = ["Ia"] if driven or not link.Ia.is_zero() else []
     return [*kinds, "Jm"] if link.rotor is not None else kinds
 

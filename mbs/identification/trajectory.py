@@ -352,7 +352,7 @@ def limits_of(
     joints = [system.coordinates[k] for k in indices]
     rates = [RATE_UNITS[joint.unit] for joint in joints]
     free: dict[str, Range] = dict.fromkeys((joint.name for joint in joints), None)
-    motors = {row.name: row for row in system.speeds}
+    motors = {row.name: row for row in system.velocity_coordinates}
 
     def rows(
         quantity: str, bound: Bound, units: Sequence[str], known: Mapping[str, Range] = free
@@ -675,7 +675,7 @@ def instant(system: System, columns: Sequence[Column], limits: MotionLimits) -> 
     Raises:
         ModelError: a column is not a parameter of the system, or the frame of a plane is unknown.
     """
-    m = len(system.active)
+    m = len(system.independent)
     q_a, v_a, a_a = (MX.sym(name, m) for name in ("q_a", "v_a", "a_a"))
     q = configuration_of(system, q_a)
     D = motion_function(regressor(system, columns))(q, v_a, a_a)
@@ -699,7 +699,7 @@ def _efforts(system: System, limits: MotionLimits, q: MX, v_a: MX, a_a: MX) -> l
     """
     if not any(limit.is_finite for limit in limits.effort):
         return [MX(0) for _ in limits.effort]
-    if system.motors != system.active:
+    if system.motors != system.independent:
         raise ModelError(
             f"{system.name}: limits of efforts are given and its motors are not its independent"
             " joints, so that they share efforts in many ways; leave the limits of efforts out"

@@ -33,12 +33,12 @@ Given = Mapping[str, float] | Sequence[float] | None
 
 
 def independent_names(system: System) -> list[str]:
-    """Return the names of the independent joints, in the order of `system.free`.
+    """Return the names of the independent joints, in the order of `system.chosen_coordinates`.
 
     Args:
         system: assembled mechanism.
     """
-    return [system.speeds[k].name for k in system.free]
+    return [system.velocity_coordinates[k].name for k in system.chosen_coordinates]
 
 
 def fixed_positions(system: System, values: Given) -> dict[str, float]:
@@ -81,7 +81,7 @@ def independent_positions(system: System, values: Given) -> list[float]:
 
     Args:
         system: assembled mechanism.
-        values: positions by name, or in the order of `system.free` [rad or m].
+        values: positions by name, or in the order of `system.chosen_coordinates` [rad or m].
 
     Raises:
         ModelError: a joint is not independent, or a value is not finite.
@@ -104,7 +104,7 @@ def independent_positions(system: System, values: Given) -> list[float]:
             )
     return [
         whole[index] if index < system.nq else spin[k]
-        for k, index in zip(system.free, indices.values(), strict=True)
+        for k, index in zip(system.chosen_coordinates, indices.values(), strict=True)
     ]
 
 
@@ -139,7 +139,9 @@ def reachable(system: System, loops: Function, q_a: Vector, p: Vector) -> str:
         if intervals:
             ranges = " or ".join(f"{low:.4g} to {high:.4g}" for low, high in intervals)
             texts.append(f"{system.coordinates[k].name} can be {ranges} {unit}")
-    held = ", the other positions as they are" if texts and len(system.free) > 1 else ""
+    held = (
+        ", the other positions as they are" if texts and len(system.chosen_coordinates) > 1 else ""
+    )
     return "; ".join(texts) + held if texts else "change several positions, the branch or lengths"
 
 
@@ -241,7 +243,7 @@ class LoopFunction(ModelFunction):
             p = np.array(DM(given.get("p", [])), dtype=float).ravel()
         except (ModelError, NotImplementedError, TypeError, ValueError):
             return None
-        sizes = len(self.system.free), len(self.system.parameters)
+        sizes = len(self.system.chosen_coordinates), len(self.system.parameters)
         fits = (q_a.size, p.size) == sizes
         return (q_a, p) if fits and np.all(np.isfinite(q_a)) and np.all(np.isfinite(p)) else None
 
@@ -281,7 +283,7 @@ def function(system: System, branch: Branch = None) -> Function:
     ways = _ways(system, stages, branch)
 
     def build() -> tuple[Named, Named]:
-        q_a = SX.sym("q_a", len(system.free))
+        q_a = SX.sym("q_a", len(system.chosen_coordinates))
         return [("q_a", q_a)], [("q", _configuration(system, stages, ways, q_a))]
 
     def make() -> Function:

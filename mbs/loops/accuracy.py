@@ -93,7 +93,7 @@ def _refuse(system: System, leads: float) -> None:
 
     `leads` is the smallest squared sine between a row of the passive joints and the rows before it.
     """
-    names = ", ".join(system.speeds[k].name for k in system.active)
+    names = ", ".join(system.velocity_coordinates[k].name for k in system.independent)
     raise SingularPosture(
         f"{system.name}: the configuration is so near a singular one that second derivatives of the"
         f" loops have no accuracy at these velocities with {names} as independent joints (sine"
@@ -133,7 +133,9 @@ def _floors(
         outputs: values of the outputs.
         tested: indices of the outputs that are tested.
     """
-    units = scales(system).columns([system.speeds[k].unit for k in system.active])
+    units = scales(system).columns(
+        [system.velocity_coordinates[k].unit for k in system.independent]
+    )
     count = v.shape[1]
     squares = np.max((v / units[:, None]) ** 2, axis=0, initial=0.0)
     masses = [k for k, name in enumerate(names) if name.startswith("dtau") and "_da" in name]
@@ -147,7 +149,7 @@ def _floors(
         if names[number].startswith("dtau"):
             sizes = (float(np.max(np.abs(_column(outputs[i], k, count)))) for i in masses)
             return found + max(sizes, default=0.0)
-        first = len(system.free) if names[number] == "A" else 0
+        first = len(system.chosen_coordinates) if names[number] == "A" else 0
         found[first : first + len(units)] = units
         return found
 
@@ -162,7 +164,7 @@ def _point(system: System, inputs: Mapping[str, Any]) -> list[Array]:
 
     They have shapes (nq, n), (m, n) and (np, n), with the same number n of columns.
     """
-    sizes = {"q": system.nq, "v_a": len(system.active), "p": len(system.parameters)}
+    sizes = {"q": system.nq, "v_a": len(system.independent), "p": len(system.parameters)}
     found = [_columns(inputs.get(name, _NO_SYMBOLS), size) for name, size in sizes.items()]
     count = max(values.shape[1] for values in found)
     return [

@@ -120,10 +120,10 @@ def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] 
     closure = Closure(
         rows=kept.positions,
         slips=kept.slips,
-        active=active,
+        independent=active,
         motors=drive.motors,
         passive=tuple(k for k in range(system.nv) if k not in active),
-        free=_free_positions(regular, kept, active),
+        chosen_coordinates=_free_positions(regular, kept, active),
         varies=_varies(regular, positions, kept),
         gruebler=system.nv - sum(len(rows) + len(slips) for rows, slips in labels),
         guess=tuple((name, float(guess[name])) for name in _names(system) if name in guess),
@@ -136,7 +136,7 @@ def analyse(system: System, guess: Mapping[str, float], chosen: tuple[int, ...] 
     return replace(
         system,
         coordinates=_with_motors(system.coordinates, drive.named),
-        speeds=_with_motors(system.speeds, drive.named),
+        velocity_coordinates=_with_motors(system.velocity_coordinates, drive.named),
         configuration=tuple(float(x) for x in configuration),
         closure=closure,
         loops=_with_rows(system.loops, labels, kept),
@@ -199,9 +199,9 @@ def _branches(
     """
     system = target.system
     names = {coordinate.name: k for k, coordinate in enumerate(system.coordinates)}
-    if not all(system.speeds[k].name in names for k in active) or system.nq >= MANY:
+    if not all(system.velocity_coordinates[k].name in names for k in active) or system.nq >= MANY:
         return []
-    locked = tuple(sorted(names[system.speeds[k].name] for k in active))
+    locked = tuple(sorted(names[system.velocity_coordinates[k].name] for k in active))
     closing = Closing(system, target.p, locked)
     steps = _BRANCH * closing.position_units[list(locked)]
     best, found = list[Matrix](), list[Matrix]()
@@ -256,7 +256,7 @@ def _measures(system: System, p: Matrix) -> tuple[Matrix, Matrix]:
     """
     at = Function("sizes", [system.p], [mechanism_size(system), constraint_sizes(system)])
     size, rows = at(p)
-    slides = [speed.unit.startswith("m") for speed in system.speeds]
+    slides = [speed.unit.startswith("m") for speed in system.velocity_coordinates]
     return np.array(rows), np.where(slides, float(size), 1.0)
 
 
@@ -391,9 +391,11 @@ def _drive(
         mobility: number of independent velocities.
     """
     if mobility == 0:
-        return _Drive((), tuple(k for k, speed in enumerate(system.speeds) if speed.actuated))
+        return _Drive(
+            (), tuple(k for k, speed in enumerate(system.velocity_coordinates) if speed.actuated)
+        )
     free = [null_space_of(_without_zeros(J), mobility) for J in jacobians]
-    motors = tuple(k for k, speed in enumerate(system.speeds) if speed.actuated)
+    motors = tuple(k for k, speed in enumerate(system.velocity_coordinates) if speed.actuated)
     first = tuple(dict.fromkeys([*chosen, *motors]))
     if len(_independent(free, (), first)) == len(first):
         known = _own_velocities(system)
@@ -406,7 +408,7 @@ def _drive(
     surplus = chosen if len(own) < len(chosen) else ()
     driving = tuple(sorted({*motors, *surplus}))
     rest = _independent(free, _independent(free, (), driving), active)
-    names = tuple(system.speeds[k].name for k in surplus)
+    names = tuple(system.velocity_coordinates[k].name for k in surplus)
     leads = _hold(free[0], active)
     return _Drive(tuple(sorted(active)), tuple(sorted({*driving, *rest})), names, leads)
 
@@ -422,7 +424,7 @@ def _hold(free: Matrix, active: Sequence[int]) -> float:
 def _own_velocities(system: System) -> list[int]:
     """Return indices in v of all velocities, without those of frames of imposed motions."""
     placed = {f"{p.name}.free" for p in system.parts if isinstance(p.element, MotionJoint)}
-    return [k for k, speed in enumerate(system.speeds) if speed.joint not in placed]
+    return [k for k, speed in enumerate(system.velocity_coordinates) if speed.joint not in placed]
 
 
 def _independent(

@@ -69,7 +69,7 @@ def _choose(system: System, active: Sequence[str]) -> tuple[int, ...]:
     Raises:
         AssemblyError: a name is no velocity, or belongs to a cut joint.
     """
-    names = [speed.name for speed in system.speeds]
+    names = [speed.name for speed in system.velocity_coordinates]
     for name in active:
         if name in [coordinate.name for coordinate in system.cut_coordinates]:
             raise AssemblyError(

@@ -70,7 +70,7 @@ def with_balance(system: System, mechanism: Description) -> System:
     for is_damped, where in ((False, first), (True, len(loops) + 1)):
         own = [b for b in balances if b.is_damped is is_damped]
         if own:
-            bound = tuple(system.speeds[balance.velocity].name for balance in own)
+            bound = tuple(system.velocity_coordinates[balance.velocity].name for balance in own)
             kind = (DAMPED, "damped balance") if is_damped else (GROUP, "balance")
             loops.insert(where, LoopRow(*kind, bound, ()))
     return replace(
@@ -81,7 +81,10 @@ def with_balance(system: System, mechanism: Description) -> System:
         coordinates=tuple(
             replace(c, actuated=False) if c.name in names else c for c in system.coordinates
         ),
-        speeds=tuple(replace(c, actuated=False) if c.name in names else c for c in system.speeds),
+        velocity_coordinates=tuple(
+            replace(c, actuated=False) if c.name in names else c
+            for c in system.velocity_coordinates
+        ),
         _cache={},
     )
 
@@ -146,7 +149,7 @@ def _rows(
         efforts = _without_velocities(still, D, range(len(own), n), range(len(own)))
     rows = []
     for k, balance in enumerate(own):
-        node = system.speeds[balance.velocity]
+        node = system.velocity_coordinates[balance.velocity]
         unit = "m" if node.unit.startswith("m") else "1"
         rows.append((node.name, Row(efforts[k] / balance.size, unit)))
     return [(DAMPED if is_damped else GROUP, rows)]
@@ -168,7 +171,8 @@ def require_no_drift(system: System, what: str, velocities: Iterable[int]) -> No
         if velocity in nodes:
             raise ModelError(
                 f"{system.name}: {what} in independent coordinates does not give the velocity of"
-                f" {system.speeds[velocity].name}, which moves no mass and which springs move while"
+                f" {system.velocity_coordinates[velocity].name}, which moves no mass and which"
+                " springs move while"
                 " the independent joints rest; use coordinates='tree', or give it a mass"
             )
 
@@ -217,7 +221,10 @@ def without_values(system: System) -> str:
         system: mechanism whose massless nodes were searched.
     """
     missing = [parameter.name for parameter in system.parameters if parameter.default is None]
-    nodes = [system.speeds[system.tree.links[j].v.start].name for j in _massless_links(system)]
+    nodes = [
+        system.velocity_coordinates[system.tree.links[j].v.start].name
+        for j in _massless_links(system)
+    ]
     if system.nodes or not nodes or not missing:
         return ""
     verb = "moves" if len(nodes) == 1 else "move"
@@ -237,7 +244,7 @@ def obstacles(system: System, velocity: int) -> str:
     link = next(
         j for j, one in enumerate(system.tree.links) if one.v.start <= velocity < one.v.stop
     )
-    node, name = system.tree.links[link], system.speeds[velocity].name
+    node, name = system.tree.links[link], system.velocity_coordinates[velocity].name
     if link not in _massless_links(system):
         return ""
     found = []

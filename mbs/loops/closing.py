@@ -240,7 +240,7 @@ class Closing:
             return self._functions().sizes(self._given)
 
         key = self.p.tobytes(), self.aims
-        found: list[Vector] = self.system.recent("closing sizes", key, build, _KEPT)
+        found: list[Vector] = self.system.memoised("closing sizes", key, build, _KEPT)
         return found
 
     def openness(self, q: Vector) -> float:

@@ -65,10 +65,10 @@ def solve(
 
     Args:
         system: assembled mechanism.
-        q_active: positions of the independent joints in the order of `system.free`, or positions of
-            any joints by name, or a `State`. Missing independent joints keep their assembled
-            positions. If all independent joints are given, further joints select the branch and
-            are checked.
+        q_active: positions of the independent joints in the order of
+            `system.chosen_coordinates`, or positions of any joints by name, or a `State`. Missing
+            independent joints keep their assembled positions. If all independent joints are given,
+            further joints select the branch and are checked.
         guess: approximate positions of other joints, cut joints included, which select the branch.
             The joints keep these values if the loops leave a motion for that.
         branch: labels from `mbs.loops.assembly_modes`, such as "j3:+", instead of a guess. A loop
@@ -428,7 +428,7 @@ def start_velocity(
             return v
     v, missed = smallest_velocity(system, J, v0, own)
     if missed:
-        names = ", ".join(system.speeds[k].name for k in system.active)
+        names = ", ".join(system.velocity_coordinates[k].name for k in system.independent)
         remedy = f"give those of independent joints: {names}" if names else "leave them out"
         raise ModelError(
             f"{system.name}: the loops allow no motion with the velocities {missed}; {remedy}"
@@ -439,7 +439,7 @@ def start_velocity(
 def _spring_speeds(system: System) -> list[str]:
     """Return names of the velocities of one-freedom joints with springs, without massless nodes."""
     return [
-        system.speeds[link.v.start].name
+        system.velocity_coordinates[link.v.start].name
         for link in system.tree.links
         if link.v.stop - link.v.start == 1
         and not link.stiffness.is_zero()
@@ -484,7 +484,7 @@ def smallest_velocity(
     if own is not None:
         v, missed = smallest_velocity(system, J, _less(system, v0, own))
         return v + own, missed
-    names = [speed.name for speed in system.speeds]
+    names = [speed.name for speed in system.velocity_coordinates]
     named = v0 is None or isinstance(v0, Mapping)
     rows = [k for k, name in enumerate(names) if not named or name in (v0 or {})]
     v = _refine(J, rows, target[rows])
@@ -509,7 +509,11 @@ def _less(system: System, v0: Values, own: Vector) -> Values:
         return None
     if not isinstance(v0, Mapping):
         return list(map(float, less))
-    return {s.name: float(x) for s, x in zip(system.speeds, less, strict=True) if s.name in v0}
+    return {
+        s.name: float(x)
+        for s, x in zip(system.velocity_coordinates, less, strict=True)
+        if s.name in v0
+    }
 
 
 def _fit(v: Vector, target: Vector) -> bool:

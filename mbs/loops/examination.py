@@ -92,7 +92,7 @@ def configuration_report(
     residual, leads, opening = (float(x) for x in configuration_health(system)(position, p))
     found = scales(system)
     J = np.array(constraint_jacobian(system)(position, p)) * found.rows.reshape(-1, 1)
-    J *= found.columns([speed.unit for speed in system.speeds])
+    J *= found.columns([speed.unit for speed in system.velocity_coordinates])
     return ConfigurationReport(
         residual, opening, system.nv - rank(J), system.closure.mobility, leads
     )
@@ -120,7 +120,7 @@ def require_determined(system: System, q: Vector, p: Vector, least: float = _DET
         )
     if leads > least:
         return
-    names = ", ".join(system.speeds[k].name for k in system.active)
+    names = ", ".join(system.velocity_coordinates[k].name for k in system.independent)
     if leads > _DETERMINED:
         raise SingularPosture(
             f"{system.name}: the configuration is so near a singular one that second derivatives"
@@ -213,7 +213,7 @@ def _scale(system: System, J: SX) -> SX:
     """
     found, kept = scales(system), kept_rows(system)
     rows = found.rows[kept] if J.shape[0] == len(kept) else found.rows
-    columns = DM(found.columns([speed.unit for speed in system.speeds]))
+    columns = DM(found.columns([speed.unit for speed in system.velocity_coordinates]))
     return J * DM(rows) * casadi.repmat(columns.T, J.shape[0], 1)
 
 

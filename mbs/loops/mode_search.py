@@ -89,8 +89,9 @@ def assembly_modes(
 
     Args:
         system: assembled mechanism.
-        q_active: positions of the independent joints, by name or in the order of `system.free`.
-            Missing positions keep their values of the assembled configuration.
+        q_active: positions of the independent joints, by name or in the order of
+            `system.chosen_coordinates`. Missing positions keep their values of
+            the assembled configuration.
         parameters: values of symbols by name. Missing symbols have their default values.
 
     Returns:

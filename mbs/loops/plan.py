@@ -605,7 +605,7 @@ def undetermined_beside(system: System, free: Vector, first: tuple[int, ...]) ->
         NoClosedForm: a spherical joint or a free body keeps some, but not all of its freedoms.
     """
     simple = [link for link in system.tree.links if link.motion.nq == 1]
-    motors = [link.q.start for link in simple if link.v.start in system.free]
+    motors = [link.q.start for link in simple if link.v.start in system.chosen_coordinates]
     others = [link.q.start for link in simple if link.q.start not in motors]
     undetermined = _raising(free, [*motors, *others], first)
     left = free.shape[1] - len(first) - len(undetermined) - len(spin_indices(system))

@@ -384,7 +384,7 @@ def _refusal(target: Goal, start: Vector, tried: Sequence[Closed]) -> str:
     away += [f"rotated by {round(angle, 6):.4g} rad"] * bool(
         set(target.rows) & {"orientation", "axis"}
     )
-    named = target.rows != WHOLE or len(closing.system.active) >= 6
+    named = target.rows != WHOLE or len(closing.system.independent) >= 6
     remedy = "" if named else f"name the rows=[...] that count, of {', '.join(ROWS)}, or "
     return (
         f"{title}; the nearest configuration found with closed loops leaves it"

@@ -74,7 +74,7 @@ def reduction(system: System, q: SX, v_a: SX | None = None) -> Reduction:
     """
     closure = system.closure
     assert closure is not None
-    active, rows = list(closure.active), determining_rows(system, q)
+    active, rows = list(closure.independent), determining_rows(system, q)
     W = -solve_large(rows.square, casadi.mtimes(rows.mixed, rows.J[:, active]))
     G = tree_rows(system, W, SX(DM.eye(len(active))))
     drift = None
@@ -102,6 +102,6 @@ def tree_rows(system: System, passive: SX, active: SX) -> SX:
     closure = system.closure
     assert closure is not None
     rows = zeros(system.nv, active.shape[1])
-    rows[list(closure.active), :] = active
+    rows[list(closure.independent), :] = active
     rows[list(closure.passive), :] = passive
     return rows

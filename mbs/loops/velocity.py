@@ -359,7 +359,7 @@ def scales(system: System) -> Scales:
         J = np.array(constraint_jacobian(system)(list(system.configuration), system.p_default))
         if J.size == 0 or not np.all(np.isfinite(J)):
             return Scales(np.ones(len(J)), 1.0)
-        units = [speed.unit for speed in system.speeds]
+        units = [speed.unit for speed in system.velocity_coordinates]
         lever = _largest_lever(J, [unit for *_, unit in position_rows(system)], units)
         size = Function("size", [system.p], [mechanism_size(system)])(system.p_default)
         # moment arms at a dwell of a cam or at a dead centre are zero, up to rounding

@@ -136,8 +136,9 @@ class DaeEquations:
     Attributes:
         x: symbols of the differential states; component states come last.
         z: symbols of the algebraic states; (0, 1) if there are none.
-        u: symbols of the inputs: motor efforts in the order of the actuated `system.speeds` without
-            a device, then component inputs in the order of `system.inputs`.
+        u: symbols of the inputs: motor efforts in the order of the actuated
+            `system.velocity_coordinates` without a device, then component inputs in the order
+            of `system.inputs`.
         p: symbols of the parameters, in the order of `system.parameters`.
         ode: time derivatives of x.
         alg: residuals of the algebraic equations, as many as z has elements.
@@ -169,7 +170,7 @@ def motors(system: System) -> list[int]:
         system: open or closed mechanism.
     """
     driven = [device.velocity for device in system.devices]
-    return [k for k, s in enumerate(system.speeds) if s.actuated and k not in driven]
+    return [k for k, s in enumerate(system.velocity_coordinates) if s.actuated and k not in driven]
 
 
 def implicit(system: System, form: str, constrained: ConstraintRows | None = None) -> DaeEquations:
@@ -203,7 +204,7 @@ def implicit(system: System, form: str, constrained: ConstraintRows | None = Non
         speed = v + casadi.mtimes(rows.J_positions.T, mu)
     return equations(
         system,
-        states=(casadi.vertcat(q, v, system.z), casadi.vertcat(a, lam, mu), u),
+        states=(casadi.vertcat(q, v, system.component_states), casadi.vertcat(a, lam, mu), u),
         ode=casadi.vertcat(position_rate(system.tree, q, speed), a, rates),
         alg=casadi.vertcat(
             needed - tau - casadi.mtimes(rows.J.T, lam), _kept_residuals(rows, form)
@@ -236,7 +237,7 @@ def open_chain(system: System) -> DaeEquations:
     (a,) = outputs_of(system, direct_dynamics(system), q, v, tau)
     return equations(
         system,
-        states=(casadi.vertcat(q, v, system.z), SX(0, 1), u),
+        states=(casadi.vertcat(q, v, system.component_states), SX(0, 1), u),
         ode=casadi.vertcat(position_rate(system.tree, q, v), a, rates),
         alg=SX(0, 1),
         invariants=norm_rows(system.tree, q),
@@ -254,13 +255,13 @@ def closed_form(system: System, branch: tuple[str, ...]) -> DaeEquations:
     Raises:
         NoClosedForm: a loop has no closed-form solution.
     """
-    active = list(system.active)
+    active = list(system.independent)
     q_a, v_a = SX.sym("q_a", len(active)), SX.sym("v_a", len(active))
     (q,) = outputs_of(system, function(system, branch), q_a)
     u, v, a, rates = _independent_motion(system, q, v_a)
     return equations(
         system,
-        states=(casadi.vertcat(q_a, v_a, system.z), SX(0, 1), u),
+        states=(casadi.vertcat(q_a, v_a, system.component_states), SX(0, 1), u),
         ode=casadi.vertcat(v_a, a, rates),
         alg=SX(0, 1),
         invariants=SX(0, 1),
@@ -277,11 +278,11 @@ def carried_positions(system: System) -> DaeEquations:
     Args:
         system: closed mechanism.
     """
-    q, v_a = SX.sym("q", system.nq), SX.sym("v_a", len(system.active))
+    q, v_a = SX.sym("q", system.nq), SX.sym("v_a", len(system.independent))
     u, v, a, rates = _independent_motion(system, q, v_a)
     return equations(
         system,
-        states=(casadi.vertcat(q, v_a, system.z), SX(0, 1), u),
+        states=(casadi.vertcat(q, v_a, system.component_states), SX(0, 1), u),
         ode=casadi.vertcat(position_rate(system.tree, q, v), a, rates),
         alg=SX(0, 1),
         invariants=casadi.vertcat(independent_closure(system, q), norm_rows(system.tree, q)),
@@ -301,7 +302,11 @@ def _independent_motion(system: System, q: SX, v_a: SX) -> tuple[SX, SX, SX, SX]
     if system.closure is not None and constraint_drift(system, q) is not None:
         v = reduction(system, q).velocities(v_a)
     u, tau, rates = driving(system, q, v)
-    pushed = casadi.mtimes(G.T, tau) if system.motors != system.active else tau[list(system.active)]
+    pushed = (
+        casadi.mtimes(G.T, tau)
+        if system.motors != system.independent
+        else tau[list(system.independent)]
+    )
     (a,) = outputs_of(system, independent_dynamics(system), q, v_a, pushed)
     return u, v, a, rates
 
@@ -403,13 +408,13 @@ def elements_of(
         "u": (*(tau[k] for k in motors(system)), *system.inputs),
         "p": tuple((parameter.name, parameter.unit) for parameter in system.parameters),
     }
-    v_a = tuple(v[k] for k in system.active)
+    v_a = tuple(v[k] for k in system.independent)
     phi, slips = (a + b for a, b in zip(_rows(system), standing, strict=True))
     rows = phi + slips
     speeds = _named_rows("der", rows, RATE_UNIT)
     explicit = {
         "open": (q + v, norms),
-        "closed form": (tuple(q[k] for k in system.active) + v_a, ()),
+        "closed form": (tuple(q[k] for k in system.independent) + v_a, ()),
         "carried": (q + v_a, phi + norms),
         "phase": (q + v, phi + speeds + norms),
     }
@@ -435,9 +440,9 @@ def elements_of(
 def _coordinates(system: System) -> tuple[Elements, Elements, Elements, Elements]:
     """Return (name, unit) of the elements of q, v, a and tau, as in simulation results."""
     q = tuple((f"{c.name}.q", c.unit) for c in system.coordinates)
-    v = tuple((f"{s.name}.v", s.unit) for s in system.speeds)
-    a = tuple((f"{s.name}.a", ACCELERATION_UNIT[s.unit]) for s in system.speeds)
-    tau = tuple((f"{s.name}.tau", EFFORT_UNIT[s.unit]) for s in system.speeds)
+    v = tuple((f"{s.name}.v", s.unit) for s in system.velocity_coordinates)
+    a = tuple((f"{s.name}.a", ACCELERATION_UNIT[s.unit]) for s in system.velocity_coordinates)
+    tau = tuple((f"{s.name}.tau", EFFORT_UNIT[s.unit]) for s in system.velocity_coordinates)
     return q, v, a, tau
 
 
@@ -621,7 +626,7 @@ def _angle_turns_matter(system: System) -> bool:
         for coupling in system.couplings:
             for k in coupling.coordinates[1:]:
                 felt[k] = True
-        active = [system.speeds[k].name for k in system.active]
+        active = [system.velocity_coordinates[k].name for k in system.independent]
         return any(
             felt[k] and c.unit == "rad" and c.name not in active
             for k, c in enumerate(system.coordinates)
@@ -682,9 +687,9 @@ def start_efforts(system: System, tau0: Values) -> Array:
     """
     tau = np.array(system.effort(tau0))
     driven = motors(system)
-    for k, speed in enumerate(system.speeds):
+    for k, speed in enumerate(system.velocity_coordinates):
         if tau[k] != 0 and k not in driven:
-            names = ", ".join(system.speeds[j].name for j in driven)
+            names = ", ".join(system.velocity_coordinates[j].name for j in driven)
             raise ModelError(
                 f"{system.name}: tau0 gives {tau[k]:g} to {speed.name!r}, which has no motor; make"
                 f" that joint actuated=True, or use one of {names or '(none)'}"
@@ -728,7 +733,7 @@ def start_values(
     if isinstance(q0, State) and own is None:
         own = q0.z
     tau = start_efforts(system, tau0)
-    z = by_name(system, "states", own, system.states, system.z_start)
+    z = by_name(system, "states", own, system.states, system.component_start)
     u = by_name(system, "inputs", inputs, system.inputs, system.u_default)
     return {"q": q, "v": v, "tau": tau, "z": z, "u": u, "p": p}
 
@@ -738,7 +743,7 @@ def _start_states(system: System, form: str, q: Array, v: Array) -> Array:
 
     `form` is the first element of the result of `_kind_of_form`.
     """
-    active = list(system.active)
+    active = list(system.independent)
     if form == "closed form":
         return np.concatenate([q[active], v[active]])
     return np.concatenate([q, v[active] if form == "carried" else v])

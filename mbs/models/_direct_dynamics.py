@@ -137,7 +137,7 @@ def independent_dynamics(system: System) -> Function:
     Raises:
         ModelError: a joint moves no inertia, so that its acceleration is undetermined.
     """
-    if system.motors == system.active:
+    if system.motors == system.independent:
         return direct_dynamics(system)
     require_inertia(system)
 
@@ -254,8 +254,8 @@ def require_inertia(system: System) -> None:
             else _without_inertia_in_tree(system)
         )
         if loose is not None:
-            number = system.active[loose]
-            name = system.speeds[number].name
+            number = system.independent[loose]
+            name = system.velocity_coordinates[number].name
             raise ModelError(
                 f"{system.name}: {name} can move without moving any inertia, so its acceleration"
                 " is not determined; give mass to what it carries, or a rotor inertia Ia; a mass of"
@@ -298,10 +298,10 @@ def velocity_without_inertia(system: System, pivots: Function) -> int | None:
 
 
 def _without_inertia_in_loops(system: System) -> int | None:
-    """Return the index in `system.active` of a velocity that moves no inertia, or None."""
+    """Return the index in `system.independent` of a velocity that moves no inertia, or None."""
     closure, q = system.closure, list(system.configuration)
     assert closure is not None
-    active, passive = list(closure.active), list(closure.passive)
+    active, passive = list(closure.independent), list(closure.passive)
     # rows selected for a different configuration may be dependent here
     here = rows_at(system, np.array(q), np.array(system.p_default))
     J = dense(constraint_jacobian(here)(q, system.p_default))[kept_rows(here)]
@@ -359,7 +359,7 @@ def _prescribed_indices(system: System, prescribed: Sequence[str]) -> tuple[int,
 
     Raise ModelError if a name is unknown or repeated, or the loops tie the velocities.
     """
-    names = [speed.name for speed in system.speeds]
+    names = [speed.name for speed in system.velocity_coordinates]
     prescribed = names_given(f"{system.name}: prescribed", prescribed, names[0])
     if not prescribed:
         raise ModelError(f"{system.name}: prescribed is empty; give names of velocities")
@@ -374,10 +374,10 @@ def _prescribed_indices(system: System, prescribed: Sequence[str]) -> tuple[int,
     if len(set(numbers)) < len(numbers):
         raise ModelError(f"{system.name}: a velocity is prescribed twice; name each once")
     if not are_independent(system, numbers):
-        told = ", ".join(system.speeds[k].name for k in numbers)
+        told = ", ".join(system.velocity_coordinates[k].name for k in numbers)
         raise ModelError(
             f"{system.name}: {told} cannot all be prescribed, since the loops tie them (mobility"
-            f" {len(system.active)}); prescribe joints that can move independently"
+            f" {len(system.independent)}); prescribe joints that can move independently"
         )
     return numbers
 

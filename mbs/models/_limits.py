@@ -63,18 +63,18 @@ def limits(system: System, *, speed: Largest = None, effort: Largest = None) -> 
                 f"{system.name}: limits and stops of {row.name!r} leave it nothing between"
                 f" {least:g} and {largest:g}; let them overlap"
             )
-    v_lower, v_upper = _bound_arrays([row.limits for row in system.speeds])
-    tau_lower, tau_upper = _bound_arrays([row.effort for row in system.speeds])
+    v_lower, v_upper = _bound_arrays([row.limits for row in system.velocity_coordinates])
+    tau_lower, tau_upper = _bound_arrays([row.effort for row in system.velocity_coordinates])
     for number, value in _magnitudes(system, "speed", speed):
         v_lower[number], v_upper[number] = -value, value
     for number, value in _magnitudes(system, "effort", effort):
-        if not system.speeds[number].actuated:
+        if not system.velocity_coordinates[number].actuated:
             raise ModelError(
-                f"{system.name}: effort has {system.speeds[number].name!r}, which has no motor;"
-                " leave it out, or make that joint actuated=True"
+                f"{system.name}: effort has {system.velocity_coordinates[number].name!r}, which has"
+                " no motor; leave it out, or make that joint actuated=True"
             )
         tau_lower[number], tau_upper[number] = -value, value
-    still = [k for k, row in enumerate(system.speeds) if not row.actuated]
+    still = [k for k, row in enumerate(system.velocity_coordinates) if not row.actuated]
     tau_lower[still] = tau_upper[still] = 0
     return Limits(q_lower, q_upper, v_lower, v_upper, tau_lower, tau_upper)
 
@@ -123,7 +123,7 @@ def _magnitudes(system: System, what: str, given: Largest) -> list[tuple[int, fl
         raise ModelError(
             f"{system.name}: {what} is {quoted(given)}; give a mapping from names to numbers"
         )
-    names = [row.name for row in system.speeds]
+    names = [row.name for row in system.velocity_coordinates]
     found: list[tuple[int, float]] = []
     for name, value in (given or {}).items():
         if name not in names:

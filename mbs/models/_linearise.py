@@ -137,7 +137,7 @@ class Linearisation:
         """
         system = self.system
         point = start_values(system, q0, v0, tau0, states, inputs, parameters, guess)
-        point["v_a"] = point["v"][list(system.active)]
+        point["v_a"] = point["v"][list(system.independent)]
         if self.holds is not None:
             self._require_mode(*(point[name] for name in self.holds.name_in()))
         found = self.function(*(point[name] for name in self.function.name_in()))
@@ -237,11 +237,11 @@ def linearise(
     if modes:
         holds = model_function(system, ("holds", *modes), held, check)
         words = _condition_texts(system)
-    free = [system.speeds[k] for k in system.free]
-    active = [system.speeds[k] for k in system.active]
+    free = [system.velocity_coordinates[k] for k in system.chosen_coordinates]
+    active = [system.velocity_coordinates[k] for k in system.independent]
     x = [(f"{row.name}.q", row.unit.removesuffix("/s")) for row in free]
     x += [(f"{row.name}.v", row.unit) for row in active]
-    driven = [system.speeds[k] for k in motors(system)]
+    driven = [system.velocity_coordinates[k] for k in motors(system)]
     u = [(f"{row.name}.tau", EFFORT_UNIT[row.unit]) for row in driven]
     return Linearisation(
         system,
@@ -310,8 +310,8 @@ def _contact_in_modes(
 def _output_units(system: System) -> dict[str, str]:
     """Return the unit of each possible output, by its name."""
     found = {f"{row.name}.q": row.unit for row in system.coordinates}
-    found |= {f"{row.name}.v": row.unit for row in system.speeds}
-    found |= {f"{row.name}.a": ACCELERATION_UNIT[row.unit] for row in system.speeds}
+    found |= {f"{row.name}.v": row.unit for row in system.velocity_coordinates}
+    found |= {f"{row.name}.a": ACCELERATION_UNIT[row.unit] for row in system.velocity_coordinates}
     found |= {name: unit for sensor in system.sensors for name, unit in sensor.columns}
     return found | dict(system.outputs)
 
@@ -338,7 +338,7 @@ def _matrices(
         pushed = s.reduced_effort(every) if s.reduction is not None else every
         (a_a,) = outputs_of(system, independent_dynamics(system), q, v_a, pushed)
     else:
-        a_a, every = contact[0].a[list(system.active)], every + contact[0].pushes
+        a_a, every = contact[0].a[list(system.independent)], every + contact[0].pushes
     a = s.tree_acceleration(a_a)
     (rates,) = with_readings(system, [rates], (q, v, a, every))
     # position change dq = T dxi for small displacements xi of the free coordinates
@@ -359,7 +359,7 @@ def _matrices(
         along = [
             casadi.mtimes(casadi.jacobian(value, q), T),
             casadi.jacobian(value, v_a),
-            casadi.jacobian(value, system.z),
+            casadi.jacobian(value, system.component_states),
         ]
         inputs = [casadi.jacobian(value, motor_efforts), casadi.jacobian(value, system.u)]
         return casadi.horzcat(*along), casadi.horzcat(*inputs)
@@ -367,7 +367,7 @@ def _matrices(
     A2, B2 = slopes(casadi.densify(a_a))
     A3, B3 = slopes(casadi.densify(rates))
     C, D = slopes(casadi.densify(_outputs(system, s, a, every, names)))
-    first = casadi.horzcat(A11, A12, SX(A11.shape[0], system.z.numel()))
+    first = casadi.horzcat(A11, A12, SX(A11.shape[0], system.component_states.numel()))
     A = casadi.vertcat(first, A2, A3)
     B = casadi.vertcat(SX(A11.shape[0], efforts.numel()), B2, B3)
     # tau contains the motor efforts; their symbols only served to differentiate
@@ -379,7 +379,7 @@ def _matrices(
 
 def _free_tangents(system: System, q: SX) -> SX:
     """Return tree velocities (nv, m) for unit rates of the free coordinates, with closed loops."""
-    free = list(system.free)
+    free = list(system.chosen_coordinates)
     if system.closure is None:
         return SX(DM.eye(system.nv))
     others = [k for k in range(system.nv) if k not in free]
@@ -401,7 +401,7 @@ def _left_inverse(system: System, N: SX) -> SX:
     # columns of N are orthogonal; the columns of a quaternion have the squared length 1/4
     sizes = casadi.sum1(N * N)
     inverse = casadi.mtimes(casadi.diag(1 / sizes.T), N.T)
-    return inverse[list(system.free), :]
+    return inverse[list(system.chosen_coordinates), :]
 
 
 def _outputs(system: System, s: ModelSymbols, a: SX, tau: SX, names: Sequence[str]) -> SX:
@@ -412,7 +412,7 @@ def _outputs(system: System, s: ModelSymbols, a: SX, tau: SX, names: Sequence[st
     values: dict[str, SX] = {}
     for k, coordinate in enumerate(system.coordinates):
         values[f"{coordinate.name}.q"] = s.q[k]
-    for k, row in enumerate(system.speeds):
+    for k, row in enumerate(system.velocity_coordinates):
         values[f"{row.name}.v"], values[f"{row.name}.a"] = s.v_tree[k], a[k]
     if any(name not in values for name in names):
         if system.sensors:

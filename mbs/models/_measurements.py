@@ -207,7 +207,7 @@ def _coordinate_signals(state: _Observed, attached: AttachedSensor) -> Readings:
     if name in [row.name for row in system.cut_coordinates]:
         q, v, a = cut_coordinate(system, s, state.a, name)
         return {"q": q, "v": v, "a": a}
-    tables = system.coordinates, system.speeds
+    tables = system.coordinates, system.velocity_coordinates
     return coordinate_readings(name, tables, s.q, s.v_tree, state.a)
 
 

@@ -205,7 +205,7 @@ def _require_inertia(system: System) -> None:
     pivots = casadi.external("pivots", str(core_library(system).path))
     number = velocity_without_inertia(system, pivots)
     if number is not None:
-        name = system.speeds[number].name
+        name = system.velocity_coordinates[number].name
         raise ModelError(
             f"{system.name}: {name} can move without moving any inertia, so its acceleration"
             " is not determined; give mass to what it carries, or a rotor inertia Ia"

@@ -88,7 +88,7 @@ def motors_apart(system: System, s: ModelSymbols) -> bool:
         system: open or closed mechanism.
         s: symbols of the model.
     """
-    return s.reduction is not None and system.motors != system.active
+    return s.reduction is not None and system.motors != system.independent
 
 
 def effort_input(system: System, s: ModelSymbols) -> tuple[str, SX, SX]:
@@ -158,5 +158,5 @@ def _independent_motors(system: System) -> list[int]:
         return list(range(system.nv))
     J = np.array(constraint_jacobian(system)(system.configuration, closure_parameters(system)))
     free = null_space_of(J, system.closure.mobility)[list(system.motors)]
-    first = tuple(k for k, motor in enumerate(system.motors) if motor in system.active)
+    first = tuple(k for k, motor in enumerate(system.motors) if motor in system.independent)
     return independent_rows([free], system.closure.mobility, first)

@@ -438,7 +438,7 @@ def _contacts(system: System) -> Contacts:
     velocity = _stack(row.velocity for row in found)
     return Contacts(
         names=tuple(
-            row.element.name if row.number is None else system.speeds[row.number].name
+            row.element.name if row.number is None else system.velocity_coordinates[row.number].name
             for row in found
         ),
         velocities=tuple(row.number for row in found),
@@ -511,7 +511,8 @@ def _collect(
             word = what.__name__ if same is what else "stop"
             raise ModelError(
                 f"{system.name}: {other.stop.name} and {element.name} act both on"
-                f" {system.speeds[number or 0].name}; give one {word} for a coordinate"
+                f" {system.velocity_coordinates[number or 0].name}; give one {word} for a"
+                " coordinate"
             )
         row = _ContactRow(w, E, key, number)
         rows.append(row)

@@ -491,12 +491,12 @@ def with_starts(system: System, values: Sequence[SX]) -> list[SX]:
 
     Args:
         system: open or closed mechanism.
-        values: expressions that may contain `system.z` and `system.u`.
+        values: expressions that may contain `system.component_states` and `system.u`.
     """
-    signals = casadi.vertcat(system.z, system.u)
+    signals = casadi.vertcat(system.component_states, system.u)
     if not signals.numel():
         return list(values)
-    numbers = SX(DM([*system.z_start, *system.u_default]))
+    numbers = SX(DM([*system.component_start, *system.u_default]))
     return [SX(value) for value in casadi.substitute(list(values), [signals], [numbers])]
 
 
@@ -577,7 +577,7 @@ def phase_dae(standing: Standing, explicit: Function, form: str, begin: PhaseSta
         **parts,
         form=form,
         elements=elements,
-        x0=np.concatenate([q, v, system.z_start]),
+        x0=np.concatenate([q, v, system.component_start]),
         z0=z0,
         u0=np.concatenate([tau[motors(system)], system.u_default]),
         p0=p,
@@ -628,7 +628,7 @@ def _explicit_equations(
     rows = rows_of(system, s.q, s.v, a).join(standing.rows(kept)(s, a))
     made = equations(
         system,
-        states=(casadi.vertcat(s.q, s.v, system.z), SX(0, 1), u),
+        states=(casadi.vertcat(s.q, s.v, system.component_states), SX(0, 1), u),
         ode=casadi.vertcat(position_rate(system.tree, s.q, s.v), a, rates),
         alg=SX(0, 1),
         invariants=casadi.vertcat(rows.positions, rows.velocities, rows.norms),

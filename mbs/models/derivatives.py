@@ -182,7 +182,7 @@ def _by_symbols_of(system: System, value: SX, names: Collection[str]) -> Blocks:
 
     Names other than "z", "u" and "p" are ignored.
     """
-    own = {"z": system.z, "u": system.u, "p": system.p}
+    own = {"z": system.component_states, "u": system.u, "p": system.p}
     return {name: casadi.jacobian(value, own[name]) for name in names if name in own}
 
 

@@ -137,7 +137,7 @@ def _closed_geometry(system: System, name: str | int, pose: Function) -> Functio
         return _followed_geometry(system, name, pose)
 
     def build() -> tuple[Named, Named]:
-        q_a = SX.sym("q_a", len(system.free))
+        q_a = SX.sym("q_a", len(system.chosen_coordinates))
         (q,) = outputs_of(system, loops, q_a)
         return [("q_a", q_a)], [("T", outputs_of(system, pose, q)[0])]
 
@@ -169,7 +169,7 @@ def _followed_geometry(system: System, name: str | int, pose: Function) -> Funct
 
     def make() -> Function:
         follow = follow_active(system)
-        inputs = [MX.sym("q_a", len(system.free))]
+        inputs = [MX.sym("q_a", len(system.chosen_coordinates))]
         if system.parameters:
             inputs.append(MX.sym("p", len(system.parameters)))
         q = follow(inputs[0], inputs[1] if system.parameters else DM(0, 1))

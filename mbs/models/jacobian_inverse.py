@@ -134,8 +134,8 @@ def selection(
     link, _ = system.frame(frame)
     system.frame(expressed_in)
     reduced = is_reduced(system, coordinates)
-    speeds = system.active if reduced else range(system.nv)
-    names = [system.speeds[k].name for k in speeds]
+    speeds = system.independent if reduced else range(system.nv)
+    names = [system.velocity_coordinates[k].name for k in speeds]
     if columns is None:
         moving = [system.tree.links[k].v for k in system.tree.path(link)]
         columns = [k for part in moving for k in range(part.start, part.stop)]

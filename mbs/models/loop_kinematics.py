@@ -49,7 +49,7 @@ def velocity_closure(system: System) -> Function:
     Returns:
         Function of q (nq, 1), which must close the loops; Wa (r, m), Wp (r, r), Wac (c, m), Wpc (c,
         r), Wc (c, c), W (r, m) with v_p = W v_a, and G (nv, m) with v = G v_a. Columns are in the
-        order of `system.closure.active` and `.passive` [rad or m in each].
+        order of `system.closure.independent` and `.passive` [rad or m in each].
 
     Raises:
         ModelError: the system is an open chain.
@@ -156,7 +156,7 @@ def _loop_rows(system: System, q: SX) -> _LoopRows:
     J = independent_constraint_rows(system, q)
     cut = [cut_velocities(system, q, cut) for cut in system.cuts if not cut.welded]
     C = casadi.vertcat(*cut) if cut else SX(0, system.nv)
-    return _LoopRows(J, casadi.densify(C), list(closure.active), list(closure.passive))
+    return _LoopRows(J, casadi.densify(C), list(closure.independent), list(closure.passive))
 
 
 def cut_velocities(system: System, q: SX, cut: Cut) -> SX:

@@ -151,7 +151,7 @@ def symbols_of(system: System, coordinates: str = "independent") -> ModelSymbols
     if not is_reduced(system, coordinates):
         v = SX.sym("v", system.nv)
         return ModelSymbols(q, v, v, "", None, poses)
-    v = SX.sym("v_a", len(system.active))
+    v = SX.sym("v_a", len(system.independent))
     reduced = reduction(system, q, v)
     # v_tree is dense: immobile joints of a sub-loop have structural zeros in G, but `substitute`
     # requires equal sparsity patterns
@@ -267,7 +267,7 @@ def outputs_of(system: System, model: Function, *values: SX) -> list[SX]:
         model: Function of a model.
         values: first inputs of the model, such as q, v and tau.
     """
-    own = {"z": system.z, "u": system.u, "p": system.p}
+    own = {"z": system.component_states, "u": system.u, "p": system.p}
     arguments = [*values, *(own[name] for name in model.name_in()[len(values) :])]
     return [SX(output) for output in model.call(arguments)]
 
@@ -324,7 +324,7 @@ def devices(system: System) -> Function:
                     f"{system.name}: the rate of a state follows from {source}, which this model"
                     " does not know; use mbs.models.dae or mbs.simulate.run"
                 )
-        inputs = [("v", v), ("z", system.z), ("u", system.u)]
+        inputs = [("v", v), ("z", system.component_states), ("u", system.u)]
         if casadi.depends_on(every, q):
             inputs.insert(0, ("q", q))
         if casadi.depends_on(every, parts.effort_symbols):
@@ -340,7 +340,7 @@ def state_count(system: System) -> int:
     Args:
         system: open or closed mechanism.
     """
-    return int(system.z.numel())
+    return int(system.component_states.numel())
 
 
 def part_equations(system: System, q: SX, v: SX) -> tuple[SX, SX, PartsAt]:
@@ -348,7 +348,7 @@ def part_equations(system: System, q: SX, v: SX) -> tuple[SX, SX, PartsAt]:
 
     The last are the `PartsAt` at q and v.
 
-    The expressions also depend on the symbols `system.z`, `system.u` and `system.p`.
+    The expressions also depend on the symbols `system.component_states`, `system.u` and `system.p`.
 
     Args:
         system: mechanism with or without components.

@@ -65,7 +65,11 @@ def check_parts(system: System) -> None:
         return
     q, v = SX.sym("q", system.nq), SX.sym("v", system.nv)
     at = PartsAt(system, q, v)
-    taken = {f"{c.name}.{x}" for c in (*system.coordinates, *system.speeds) for x in _COLUMNS}
+    taken = {
+        f"{c.name}.{x}"
+        for c in (*system.coordinates, *system.velocity_coordinates)
+        for x in _COLUMNS
+    }
     for name, _ in (*system.states, *system.inputs, *system.outputs):
         if name in taken:
             raise AssemblyError(
@@ -290,7 +294,7 @@ class _Check:
                     )
                 value = self._value(f"row {label!r}", row.value if isinstance(row, Row) else row)
                 bound.append(value)
-                signals = casadi.vertcat(self.system.z, *self.inputs.values())
+                signals = casadi.vertcat(self.system.component_states, *self.inputs.values())
                 self._require_free_of(value, f"the row {label!r}", signals, "states or inputs")
                 if method == "rows":
                     self._require_free_of(value, f"the row {label!r}", self.v, "velocities")
@@ -384,7 +388,9 @@ class _Check:
                     f"{self._title}: limits gives {_value_text(pair)} for {port}; give (lower,"
                     " upper), None for no limit"
                 )
-            every = casadi.vertcat(self.q, self.v, self.system.z, *self.inputs.values())
+            every = casadi.vertcat(
+                self.q, self.v, self.system.component_states, *self.inputs.values()
+            )
             for given in pair:
                 if given is not None:
                     value = self._value(f"a limit of {port}", given)
@@ -431,7 +437,7 @@ class _Check:
         """
         name = f"the {what}{_of_label(label)}"
         value = self._value(name, given)
-        signals = casadi.vertcat(self.system.z, self.system.u, *self.inputs.values())
+        signals = casadi.vertcat(self.system.component_states, self.system.u, *self.inputs.values())
         self._require_free_of(value, name, signals, "states or inputs")
         slopes = casadi.jacobian(value, self.v)
         if not slopes.nnz():
@@ -460,7 +466,7 @@ class _Check:
         """
         name = f"the gap{_of_label(label)}"
         gap = self._value(name, law.gap)
-        signals = casadi.vertcat(self.system.z, self.system.u, *self.inputs.values())
+        signals = casadi.vertcat(self.system.component_states, self.system.u, *self.inputs.values())
         self._require_free_of(gap, name, signals, "states or inputs")
         self._require_free_of(gap, name, self.v, "velocities")
         if not casadi.depends_on(gap, self.q):
@@ -495,7 +501,7 @@ class _Check:
 
         It must also be finite. `what` is its name and `remedy` the remedy in the message.
         """
-        symbols = casadi.vertcat(self.system.z, *self.inputs.values())
+        symbols = casadi.vertcat(self.system.component_states, *self.inputs.values())
         given = [self.q, self.v, symbols, self.system.p]
         found = Function("range", given, [value, SX(least), SX(greatest)])
         for point in self._probes():
@@ -549,7 +555,7 @@ class _Check:
         known = casadi.vertcat(
             self.q,
             self.v,
-            self.system.z,
+            self.system.component_states,
             self.system.u,
             self.system.p,
             self.at.effort_symbols,
@@ -612,7 +618,10 @@ class _Check:
         P is the power of `loads` on the ports, E the `energy`, and D (`heat`) the dissipation.
         `rates` are the rates of the states of the component.
         """
-        system, symbols = self.system, casadi.vertcat(self.system.z, *self.inputs.values())
+        system, symbols = (
+            self.system,
+            casadi.vertcat(self.system.component_states, *self.inputs.values()),
+        )
         E = SX(0) if energy is None else energy
         rate = casadi.jtimes(E, self.q, position_rate(system.tree, self.q, self.v))
         for name, value in rates.items():
@@ -672,7 +681,9 @@ class _Check:
             q = rng.uniform(-1.0, 1.0, system.nq)
             for part in quaternion_slices(system.tree):
                 q[part] /= np.linalg.norm(q[part])
-            states = np.array(system.z_start) + rng.uniform(-1.0, 1.0, len(system.z_start))
+            states = np.array(system.component_start) + rng.uniform(
+                -1.0, 1.0, len(system.component_start)
+            )
             inputs = rng.uniform(-1.0, 1.0, len(self.inputs))
             v = rng.uniform(-1.0, 1.0, system.nv)
             yield q, v, np.concatenate([states, inputs]), p

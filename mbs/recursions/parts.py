@@ -54,7 +54,7 @@ def later_signal(system: System, source: WireSource) -> SX:
         system: system that caches the symbol.
         source: sensor and signal.
     """
-    symbol: SX = system.recent("readings", source, lambda: SX.sym(str(source)), _MOST_READINGS)
+    symbol: SX = system.memoised("readings", source, lambda: SX.sym(str(source)), _MOST_READINGS)
     return symbol
 
 
@@ -292,7 +292,7 @@ class PartsAt:
         name, _, element = source.signal.partition(".")
         readings: Readings = {}
         if sensor.reads == "coordinate":
-            tables = self.system.coordinates, self.system.speeds
+            tables = self.system.coordinates, self.system.velocity_coordinates
             readings = coordinate_readings(attached.coordinate, tables, self.q, self.v)
         elif sensor.reads in ("absolute", "relative", "distance"):
             readings = frame_readings(self.tree, attached, self.q, self.moving)
@@ -516,7 +516,9 @@ class PartsAt:
         """
         assert self.v is not None
         rate_q = position_rate(self.tree, self.q, self.v)
-        turning = [k for k, speed in enumerate(self.system.speeds) if speed.unit == "rad/s"]
+        turning = [
+            k for k, speed in enumerate(self.system.velocity_coordinates) if speed.unit == "rad/s"
+        ]
         rows = [SX(0, 2)]
         for one in found:
             if one.pace.is_zero():
@@ -646,7 +648,7 @@ def after_events(system: System, events: Sequence[PartEvent], fired: SX) -> SX:
         events: events of all components.
         fired: 1 for each event that occurs, else 0.
     """
-    after = SX(system.z)
+    after = SX(system.component_states)
     for k, event in enumerate(events):
         for index, value in event.then.items():
             after[index] = casadi.if_else(fired[k], value, after[index])

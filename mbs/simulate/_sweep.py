@@ -221,7 +221,10 @@ def _simulation(model: object, cases: Sequence[Case]) -> _SystemSimulation | _Fm
 
 
 def _system_names(system: System) -> set[str]:
-    positions, speeds = (c.name for c in system.coordinates), [s.name for s in system.speeds]
+    positions, speeds = (
+        (c.name for c in system.coordinates),
+        [s.name for s in system.velocity_coordinates],
+    )
     known = {*system.symbol_table, *(f"{name}.q" for name in positions)}
     known = known.union(*_signals(system).values())
     return known | {f"{name}{ending}" for name in speeds for ending in (".v", ".tau")}

@@ -56,13 +56,13 @@ def device_states(system: System, z0: Mapping[str, float] | Sequence[float] | No
     Args:
         system: open or closed system.
         z0: dict of states by name, such as `motor.i`, or sequence of all states. A state without
-            value starts at its default `system.z_start`.
+            value starts at its default `system.component_start`.
 
     Raises:
         ModelError: a name is unknown, the number of values is wrong, or a value is not finite.
     """
     if z0 is None or isinstance(z0, Mapping):
-        return list(by_name(system, "z0", z0, system.states, system.z_start))
+        return list(by_name(system, "z0", z0, system.states, system.component_start))
     names, values = [name for name, _ in system.states], _finite_values(system, "z0", z0)
     if len(values) != len(names):
         raise ModelError(

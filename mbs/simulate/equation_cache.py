@@ -31,7 +31,7 @@ def cached_on_disk(system: System, laws: Any, derive: Callable[[], FullState]) -
         laws: cache key of the laws.
         derive: callable that derives the state equation.
     """
-    own = system.content()
+    own = system.fingerprint()
     if own is None or os.environ.get("MBS_KEEP_EQUATIONS", "1") == "0":
         return derive()
     content = repr((own, laws, casadi.CasadiMeta.version(), _source_hash()))

@@ -126,7 +126,7 @@ def _set_start(
 
 def _prescribe(system: System, name: str, law: Any) -> Prescribed:
     base, _, kind = str(name).rpartition(".")
-    speeds = [speed.name for speed in system.speeds]
+    speeds = [speed.name for speed in system.velocity_coordinates]
     positions = [coordinate.name for coordinate in system.coordinates]
     known = [f"{n}.{k}" for n in speeds for k in _KINDS if k != "q" or n in positions]
     if name not in known:
@@ -138,10 +138,17 @@ def _prescribe(system: System, name: str, law: Any) -> Prescribed:
     if isinstance(law, str | Signal):
         value, z_rate = _law_of_signal(system, name, str(law))
     else:
-        value, z_rate = _law_of_time(system, name, law, t), SX.zeros(system.z.numel())
+        value, z_rate = (
+            _law_of_time(system, name, law, t),
+            SX.zeros(system.component_states.numel()),
+        )
 
     def rate_of(expression: SX) -> SX:
-        by_states = casadi.jtimes(expression, system.z, z_rate) if system.z.numel() else SX(0)
+        by_states = (
+            casadi.jtimes(expression, system.component_states, z_rate)
+            if system.component_states.numel()
+            else SX(0)
+        )
         return casadi.jacobian(expression, t) + by_states
 
     rate = rate_of(value)
@@ -151,7 +158,7 @@ def _prescribe(system: System, name: str, law: Any) -> Prescribed:
         "a": (SX(0), SX(0), value),
     }[kind]
     position = positions.index(base) if kind == "q" else None
-    inputs = [t, system.z, system.p]
+    inputs = [t, system.component_states, system.p]
     function = Function("motion", inputs, list(laws), {"allow_free": True})
     if function.has_free():
         raise ModelError(
@@ -166,7 +173,7 @@ def _law_of_signal(system: System, name: str, given: str) -> tuple[SX, SX]:
     """Return a signal of a component and the rates (nz, 1) of all states of components."""
     q, v = (
         casadi.vertcat(SX(0, 1), *(SX.sym(f"{row.name}.{letter}") for row in rows))
-        for letter, rows in (("q", system.coordinates), ("v", system.speeds))
+        for letter, rows in (("q", system.coordinates), ("v", system.velocity_coordinates))
     )
     sources = {
         f"{part.name}.{signal}": WireSource(part.name, signal)

@@ -82,7 +82,7 @@ def columns_of(system: System, outputs: tuple[str, ...] | None) -> ResultColumns
     every: list[_Column] = []
     for k, coordinate in enumerate(system.coordinates):
         every.append((f"{coordinate.name}.q", coordinate.unit, "x", k))
-    for k, speed in enumerate(system.speeds):
+    for k, speed in enumerate(system.velocity_coordinates):
         every.append((f"{speed.name}.v", speed.unit, "x", nq + k))
         every.append((f"{speed.name}.a", ACCELERATION_UNIT[speed.unit], "a", k))
         every.append((f"{speed.name}.tau", EFFORT_UNIT[speed.unit], "tau", k))
@@ -123,7 +123,7 @@ def _state_names(system: System) -> _StateNames:
     """Return the names of positions, velocities and states of components."""
     return (
         tuple(row.name for row in system.coordinates),
-        tuple(row.name for row in system.speeds),
+        tuple(row.name for row in system.velocity_coordinates),
         tuple(name for name, _ in system.states),
     )
 

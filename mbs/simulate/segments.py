@@ -230,14 +230,18 @@ def _free_joint_message(system: System, q: Array, p: Array) -> str:
     """Return text with the joint that moves most in the least constrained directions at q."""
     found = scales(system)
     J = np.array(constraint_jacobian(system)(q, p))
-    J = J * found.rows.reshape(-1, 1) * found.columns([speed.unit for speed in system.speeds])
+    J = (
+        J
+        * found.rows.reshape(-1, 1)
+        * found.columns([speed.unit for speed in system.velocity_coordinates])
+    )
     assert system.closure is not None
     rank = system.nv - system.closure.mobility
     if not rank or not np.isfinite(J).all():
         return ""
     free = np.linalg.svd(J)[2][rank - 1 :]  # at least the free directions at q
     moves = np.round(np.sum(free**2, axis=0), 6)  # rounded: the first of equal joints is chosen
-    name = system.speeds[int(np.argmax(moves))].name
+    name = system.velocity_coordinates[int(np.argmax(moves))].name
     return f", and the loops hardly hold {name} there"
 
 

@@ -119,7 +119,9 @@ class Simulator(MadeOnce):
         if outputs is not None:
             self._outputs = names_given(f"{system.name}: outputs", outputs, "j1.q")
         columns = partial(columns_of, system, self._outputs)
-        self._columns: ResultColumns = system.recent("columns", self._outputs, columns, _CACHE_SIZE)
+        self._columns: ResultColumns = system.memoised(
+            "columns", self._outputs, columns, _CACHE_SIZE
+        )
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -231,7 +233,7 @@ class Simulator(MadeOnce):
 
         If the laws or components contain user-defined Python code, it is the pickled equation.
         """
-        known = self.system.content(), self._key
+        known = self.system.fingerprint(), self._key
         if None not in known:
             return repr(known).encode()
         return pickle.dumps(replace(self._equations(self.system), prepared={}))
@@ -245,7 +247,7 @@ class Simulator(MadeOnce):
         def build() -> FullState:
             return cached_on_disk(system, self._key, lambda: full_state(system, *laws))
 
-        found: FullState = system.recent("state equations", self._key, build, _CACHE_SIZE)
+        found: FullState = system.memoised("state equations", self._key, build, _CACHE_SIZE)
         return found
 
 
@@ -300,11 +302,11 @@ def _consistent_start(
         return start_position(system, q0, named)
 
     def build() -> tuple[Array, Array]:
-        q: Array = system.recent("start positions", (positions, *own), position, _CACHE_SIZE)
+        q: Array = system.memoised("start positions", (positions, *own), position, _CACHE_SIZE)
         return q, start_velocity(system, q, v0, named)
 
     key = (positions, velocities, *own)
-    found: tuple[Array, Array] = system.recent("starts", key, build, _CACHE_SIZE)
+    found: tuple[Array, Array] = system.memoised("starts", key, build, _CACHE_SIZE)
     return found
 
 
@@ -366,7 +368,7 @@ def simulator_of(system: System, inputs: Sequence[str] = (), **laws: Any) -> Sim
         if type(law) is not dict or any(type(value) not in (int, float) for value in law.values()):
             return build()
         key.append(f"{name} {law}")  # with all digits, and the signs of zeros
-    found: Simulator = system.recent("simulators", tuple(key), build, _CACHE_SIZE)
+    found: Simulator = system.memoised("simulators", tuple(key), build, _CACHE_SIZE)
     return found
 
 

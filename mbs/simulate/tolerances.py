@@ -93,7 +93,7 @@ def tolerances_of(system: System, given: Tolerance) -> Tolerances:
         every = np.full(system.nq + system.nv + len(system.states), common)
         return Tolerances(common, every, _RELATIVE * every, False)
     states = [(f"{c.name}.q", c.unit) for c in system.coordinates]
-    states += [(f"{s.name}.v", s.unit) for s in system.speeds]
+    states += [(f"{s.name}.v", s.unit) for s in system.velocity_coordinates]
     states += list(system.states)
     known = [OTHERS, *dict.fromkeys(unit for _, unit in states), *(name for name, _ in states)]
     numbers = dict[str, tuple[float, float]]()

@@ -83,7 +83,7 @@ def _look(scene: PosedLinks, joint: SkeletonJoint) -> tuple[str, str]:
     """Return role and palette colour of a joint, which depend on whether it is cut or actuated."""
     if joint.cut:
         return "loop", "loop"
-    driven = any(c.actuated for c in scene.system.speeds if c.joint == joint.name)
+    driven = any(c.actuated for c in scene.system.velocity_coordinates if c.joint == joint.name)
     return "joint", "active" if driven else "joint"
 
 

@@ -63,7 +63,7 @@ def test_a_driven_joint_stays_in_the_tree(driven):
     system = four_bar(**{driven: {"actuated": True}}).assemble(guess={"j2": 1.0})
     assert driven in names(system)
     assert cuts(system) != [driven]
-    assert [system.speeds[k].name for k in system.active] == [driven]
+    assert [system.velocity_coordinates[k].name for k in system.independent] == [driven]
 
 
 def test_guessed_joints_stay_in_the_tree():
@@ -109,7 +109,7 @@ def test_a_cut_joint_with_friction_keeps_its_coordinate():
 def test_friction_in_a_welded_cut_joint_does_work():
     every = {f"j{k}": {"Fv": 0.1 * k} for k in (1, 2, 3, 4)}
     system = four_bar(**every).assemble(guess={"j2": 1.0})
-    driver = system.speeds[system.active[0]].name
+    driver = system.velocity_coordinates[system.independent[0]].name
     run = mbs.simulate.run(system, duration=0.4, v0={driver: 3.0}, step=0.002, quiet=True)
     E = np.array(run["kinetic_energy"]) + np.array(run["potential_energy"])
     power = sum(0.1 * k * np.array(run[f"j{k}.v"]) ** 2 for k in (1, 2, 3, 4))
@@ -268,7 +268,7 @@ def test_mobility_and_conservation_of_energy(make, mobility, gruebler):
     kept = sum(len(row.rows) - len(row.dropped) for row in system.loops)
     assert kept == len(system.closure.rows)
     assert f"Mobility {mobility} (Gruebler-Kutzbach counts {gruebler})" in system.report()
-    start = {system.speeds[system.active[0]].name: 0.5}
+    start = {system.velocity_coordinates[system.independent[0]].name: 0.5}
     run = mbs.simulate.run(system, duration=0.3, v0=start, step=0.05, quiet=True, tolerance=1e-9)
     T = np.array(run["kinetic_energy"])
     E = T + np.array(run["potential_energy"])
@@ -280,7 +280,7 @@ def test_a_gear_follows():
     m, _ = gear()
     system = m.assemble()
     assert [(c.name, c.actuated) for c in system.coordinates] == [("j1", True), ("j2", False)]
-    assert [system.speeds[k].name for k in system.active] == ["j1"]
+    assert [system.velocity_coordinates[k].name for k in system.independent] == ["j1"]
     assert system.configuration[1] == pytest.approx(
         0.1 - 2 * system.configuration[0] + 0.3 * system.configuration[0] ** 2
     )
@@ -355,9 +355,9 @@ def test_refused(make, error, parts):
 def test_more_motors_than_the_mobility_are_all_kept(other):
     m = four_bar(j1={"actuated": True}, **{other: {"actuated": True}})
     system = m.assemble(guess={"j2": 1.0})
-    names = [speed.name for speed in system.speeds]
+    names = [speed.name for speed in system.velocity_coordinates]
     assert [names[k] for k in system.motors] == ["j1", other]
-    assert len(system.active) == 1
+    assert len(system.independent) == 1
 
 
 def test_motors_that_depend_on_each_other():
@@ -368,10 +368,10 @@ def test_motors_that_depend_on_each_other():
 
     m = four_bar(base=carried, j1={"actuated": True}, j4={"actuated": True})
     system = m.assemble(guess={"j2": 1.0})
-    names = [speed.name for speed in system.speeds]
+    names = [speed.name for speed in system.velocity_coordinates]
     assert {names[k] for k in system.motors} == {"shoulder", "j1", "j4"}
-    assert len(system.active) == system.closure.mobility == 2
-    assert names.index("shoulder") in system.active
+    assert len(system.independent) == system.closure.mobility == 2
+    assert names.index("shoulder") in system.independent
 
 
 def test_no_motion_left():
@@ -381,7 +381,7 @@ def test_no_motion_left():
     m.connect(m.world.at(1), Revolute("j2"), b.at(1))
     system = m.assemble()
     assert system.closure.mobility == 0
-    assert system.active == system.free == ()
+    assert system.independent == system.chosen_coordinates == ()
     assert "Mobility 0" in system.report()
     result = mbs.simulate.run(system, 0.1)
     np.testing.assert_allclose([result["j1.q"], result["j1.v"]], 0, atol=1e-12)

@@ -95,7 +95,10 @@ def test_elastic_gear_leaves_the_joint_passive_and_the_rotor_actuated():
     m.connect(motor.flange, gear.flange_a)
     m.connect(gear.flange_b, joint.flange)
     system = m.assemble()
-    assert [(c.name, c.actuated) for c in system.speeds] == [("j", False), ("motor.rotor", True)]
+    assert [(c.name, c.actuated) for c in system.velocity_coordinates] == [
+        ("j", False),
+        ("motor.rotor", True),
+    ]
     np.testing.assert_allclose(inertia(system), np.diag([0.3, 1e-4]), atol=1e-18)
     q, v = np.array([0.1, 2.0]), np.array([-0.3, 7.0])
     torque = 800 * (q[1] / 40 - q[0]) + 3 * (v[1] / 40 - v[0])
@@ -128,7 +131,7 @@ def test_two_joints_on_one_shaft_are_coupled():
     m.connect(gear.flange_b, joint.flange)
     m.connect(drive.flange, other.flange)
     system = m.assemble()
-    assert [system.speeds[k].name for k in system.active] == ["j"]
+    assert [system.velocity_coordinates[k].name for k in system.independent] == ["j"]
     assert inertia(system)[0, 0] == pytest.approx(0.3 + 16 * 0.02, rel=1e-12)
     assert float(system.devices[0].factor) == 4
     assert "other follows j" in system.report()
@@ -349,7 +352,7 @@ def test_parts_on_a_fixed_shaft_do_not_move():
     m.connect(gear.flange_b, second.flange_a)
     m.connect(torque.flange, free.flange_a)
     system = m.assemble()
-    assert [speed.name for speed in system.speeds] == ["free"]
+    assert [speed.name for speed in system.velocity_coordinates] == ["free"]
     assert "IdealGear g" in system.report()
     result = mbs.simulate.run(system, 1.0, u={"t": 3.0}, quiet=True)
     assert result["free.v"][-1] == pytest.approx(2.0, abs=1e-9)

@@ -252,7 +252,7 @@ def test_tables():
         "cyl.phi",
         "rev",
     ]
-    assert [c.unit for c in system.speeds] == ["m/s"] * 3 + ["rad/s"] * 3 + [
+    assert [c.unit for c in system.velocity_coordinates] == ["m/s"] * 3 + ["rad/s"] * 3 + [
         "m/s",
         "rad/s",
         "rad/s",

@@ -145,7 +145,7 @@ def test_systems_travel_whole(name):
     again = pickle.loads(pickle.dumps(system))
     assert again.report() == system.report()
     assert again.parameters == system.parameters
-    q, v = np.array(system.configuration), np.full(len(system.active), 0.3)
+    q, v = np.array(system.configuration), np.full(len(system.independent), 0.3)
     one, other = (mbs.models.direct_dynamics(s) for s in (system, again))
     assert np.array_equal(np.array(one(q, v, v)), np.array(other(q, v, v)))
     assert other.name_in() == one.name_in()

@@ -34,7 +34,7 @@ def test_rows_are_closed_or_flagged(name):
     q = mbs.native.batch(dae.function())(x[good], np.zeros(0), u[good], dae.p0)[3]
     closed = mbs.loops.closure_residual(system)
     assert max(np.abs(closed(row).full()).max() for row in q) < 1e-12
-    motors = [system.speeds[k].name for k in system.active]
+    motors = [system.velocity_coordinates[k].name for k in system.independent]
     for k in np.flatnonzero(good)[:3]:
         driven = dict(zip(motors, u[k], strict=True))
         run = mbs.simulate.run(system, 0.6, tau=driven, tolerance=1e-10, step=0.1, **QUIET)

@@ -36,15 +36,17 @@ def wired(*blocks, wires=()):
     for block in blocks:
         m.add(block)
     for source, target in wires:
-        m.wire(source, target)
+        m.connect_signal(source, target)
     return m
 
 
 def outputs(system, u):
     """Outputs by name at inputs by name."""
     at = PartsAt(system, casadi.SX.sym("q", system.nq), casadi.SX.sym("v", system.nv))
-    find = casadi.Function("find", [system.z, system.u, system.p], [at.outputs(), at.rates()])
-    y, _ = find(system.z_start, [u.get(name, 0.0) for name, _ in system.inputs], 1.0)
+    find = casadi.Function(
+        "find", [system.component_states, system.u, system.p], [at.outputs(), at.rates()]
+    )
+    y, _ = find(system.component_start, [u.get(name, 0.0) for name, _ in system.inputs], 1.0)
     return dict(zip([name for name, _ in system.outputs], np.array(y)[:, 0], strict=True))
 
 
@@ -145,8 +147,8 @@ class TestControllers:
         m.connect(drive.flange, wheel.flange_a)
         m.add(JointSensor("enc", "wheel"))
         pid = PID("pid", kp=4.0, ki=6.0, kd=0.3, filter=0.01)
-        m.wire("enc.q", pid.measured)
-        m.wire(pid.u, drive.tau)
+        m.connect_signal("enc.q", pid.measured)
+        m.connect_signal(pid.u, drive.tau)
         system = m.assemble()
         dae = mbs.models.dae(system)
         A = casadi.Function("A", [dae.x, dae.u, dae.p], [casadi.jacobian(dae.ode, dae.x)])
@@ -184,8 +186,8 @@ class TestControllers:
         m.add(motor)
         m.connect(motor.flange, ShaftInertia("load", 1e-2).flange_a)
         pi = PI("pi", kp=5.0, ki=500.0)
-        m.wire("motor.i", pi.measured)
-        m.wire(pi.u, motor.voltage)
+        m.connect_signal("motor.i", pi.measured)
+        m.connect_signal(pi.u, motor.voltage)
         result = mbs.simulate.run(m.assemble(), 0.2, u={"pi.target": 3.0})
         # a ramp of the back voltage, K dw/dt = 0.1 * 0.3 / 0.011 V/s, leaves ramp / ki
         assert abs(result["motor.i"][-1] - (3 - 0.1 * 0.3 / 0.011 / 500)) < 1e-3

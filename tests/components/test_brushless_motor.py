@@ -89,9 +89,9 @@ def test_one_inductance_is_a_dc_motor_along_q():
     m, motor = spindle(inductance_q=None)
     hold = PI("hold", kp=20.0, ki=4000.0)
     zero = Constant("zero", 0.0)
-    m.wire("motor.i_d", hold.measured)
-    m.wire(zero.y, hold.target)
-    m.wire(hold.u, motor.v_d)
+    m.connect_signal("motor.i_d", hold.measured)
+    m.connect_signal(zero.y, hold.target)
+    m.connect_signal(hold.u, motor.v_d)
     result = mbs.simulate.run(
         m.assemble(), 0.1, u={"motor.v_q": 5.0}, step=1e-3, method="rodas", tolerance=1e-9
     )

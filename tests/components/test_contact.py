@@ -79,7 +79,7 @@ def seen(system, *methods):
     for name in methods:
         found = getattr(part.element, name)(at.at(part))
         values.append(casadi.vertcat(*found.values()) if isinstance(found, dict) else found)
-    return Function("seen", [q, v, system.z, system.p], values)
+    return Function("seen", [q, v, system.component_states, system.p], values)
 
 
 @pytest.mark.parametrize("friction_law", ["regularised", "bristle"])
@@ -92,7 +92,7 @@ def test_forces_have_the_power_of_energy_and_heat(shape, friction_law):
     rng = np.random.default_rng(3)
     pressed = seen(system, "outputs")
     states = [rng.uniform(-0.3, 0.3, system.nq) for _ in range(20)]
-    rest = np.zeros(system.z.numel())
+    rest = np.zeros(system.component_states.numel())
     forces = [pressed(q, np.zeros(system.nv), rest, []).full().ravel()[::4] for q in states]
     assert np.max(forces) > 10  # it was asked where it touches
 
@@ -123,10 +123,10 @@ def of(system, position, velocity=(0, 0, 0), angular=(0, 0, 0), turn=(1, 0, 0, 0
     names = [c.name for c in system.coordinates]
     q = dict(zip(names, [*position, *turn], strict=True))
     v = np.array([*velocity, *angular])
-    z = np.zeros(system.z.numel()) if z is None else z
+    z = np.zeros(system.component_states.numel()) if z is None else z
     values = seen(system, "outputs")(list(q.values()), v, z, []).full().ravel()
     own = system.parts[0].element.output_names
-    extra = [z] if system.z.numel() else []
+    extra = [z] if system.component_states.numel() else []
     rest = mbs.models.inverse_dynamics(system)(list(q.values()), v, np.zeros(6), *extra)
     m = mbs.Mechanism("free", gravity=(0, 0, -9.81))
     body = m.add(Body("b", mass=0.5, inertia=(1e-3, 1e-3, 1e-3)))

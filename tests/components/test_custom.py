@@ -441,7 +441,7 @@ class TestRows:
         )
         m = pendulum(lambda tip: mine("c", tip))
         m.add(JointSensor("enc", "j1"))
-        m.wire("enc.q", m.components["c"].order)
+        m.connect_signal("enc.q", m.components["c"].order)
         refused(AssemblyError, "the row 'a' depends on states or inputs", by=m.assemble)
 
     @pytest.mark.parametrize("extra", [lambda v: v**2, lambda v: v + 1, lambda v: casadi.sin(v)])
@@ -524,22 +524,22 @@ class TestWires:
     def test_what_is_no_signal(self):
         m = pendulum()
         gain = m.add(Gain("k", 2.0))
-        refused(DescriptionError, "m:", "no output", by=lambda: m.wire(gain.u, gain.u))
-        refused(DescriptionError, "m:", "no output", by=lambda: m.wire(3.0, gain.u))
-        refused(DescriptionError, "m:", "no input", by=lambda: m.wire(gain.y, gain.y))
-        refused(DescriptionError, "m:", "no input", by=lambda: m.wire(gain.y, "k.y"))
+        refused(DescriptionError, "m:", "no output", by=lambda: m.connect_signal(gain.u, gain.u))
+        refused(DescriptionError, "m:", "no output", by=lambda: m.connect_signal(3.0, gain.u))
+        refused(DescriptionError, "m:", "no input", by=lambda: m.connect_signal(gain.y, gain.y))
+        refused(DescriptionError, "m:", "no input", by=lambda: m.connect_signal(gain.y, "k.y"))
         assert m.wires == []
 
     def test_what_is_not_there(self):
         m = pendulum()
         gain = m.add(Gain("k", 2.0))
-        m.wire("enc.q", gain.u)
+        m.connect_signal("enc.q", gain.u)
         refused(AssemblyError, "k.u is wired to 'enc.q'", "no signal", by=m.assemble)
 
     def test_a_component_that_was_taken_away(self):
         m = pendulum()
         m.add(JointSensor("enc", "j1"))
-        m.wire("enc.q", Gain("k", 2.0).u)
+        m.connect_signal("enc.q", Gain("k", 2.0).u)
         del m.components["k"]
         refused(AssemblyError, "k.u, whose component is not in the mechanism", by=m.assemble)
 
@@ -547,33 +547,33 @@ class TestWires:
         m = pendulum()
         gain, other = Gain("k", 2.0), Gain("other", 1.0)
         m.add(JointSensor("enc", "j1"))
-        m.wire("enc.q", gain.u)
-        m.wire(other.y, gain.u)
+        m.connect_signal("enc.q", gain.u)
+        m.connect_signal(other.y, gain.u)
         refused(AssemblyError, "k.u is wired to enc.q and to other.y", "one source", by=m.assemble)
 
     def test_components_are_added(self):
         m = pendulum()
         gain, other = Gain("k", 2.0), Gain("other", 1.0)
-        m.wire(other.y, gain.u)
+        m.connect_signal(other.y, gain.u)
         assert m.components["k"] is gain
         assert m.components["other"] is other
         refused(
             DescriptionError,
             "two components are named 'k'",
-            by=lambda: m.wire(Gain("k", 2.0).y, other.u),
+            by=lambda: m.connect_signal(Gain("k", 2.0).y, other.u),
         )
 
     def test_rings(self):
         m = pendulum()
         a, b, c = (m.add(Gain(name, 2.0)) for name in "abc")
         for one, two in ((a, b), (b, c), (c, a)):
-            m.wire(one.y, two.u)
+            m.connect_signal(one.y, two.u)
         refused(AssemblyError, "ring", "a.y", "b.y", "c.y", "states", by=m.assemble)
         # a state in the ring breaks it
         m = pendulum()
         a, b = m.add(Gain("a", -2.0)), m.add(Integrator("b", x=1.0))
-        m.wire(a.y, b.u)
-        m.wire(b.y, a.u)
+        m.connect_signal(a.y, b.u)
+        m.connect_signal(b.y, a.u)
         result = mbs.simulate.run(m.assemble(), 0.5, tolerance=1e-10, quiet=True)
         assert np.abs(result["b.y"] - np.exp(-2 * result.time)).max() < 1e-9
 
@@ -591,8 +591,8 @@ class TestWires:
 
         m = pendulum()
         two, gain = m.add(Two("two")), m.add(Gain("k", 3.0))
-        m.wire(two.one, gain.u)
-        m.wire(gain.y, two.u)
+        m.connect_signal(two.one, gain.u)
+        m.connect_signal(gain.y, two.u)
         result = mbs.simulate.run(m.assemble(), 0.01, quiet=True)
         assert result["two.same"][-1] == 12.0
 
@@ -611,8 +611,8 @@ class TestWires:
         m.add(JointSensor("enc", "j1"))
         m.add(AbsoluteSensor("tip", m.components["bar"].right))
         gain, push = m.add(Gain("k", 2.0)), m.add(Push("push", "j1"))
-        m.wire(reading, gain.u)
-        m.wire(gain.y, push.u)
+        m.connect_signal(reading, gain.u)
+        m.connect_signal(gain.y, push.u)
         refused(AssemblyError, "k.y", "push.u", "accelerations or forces", by=m.assemble)
 
     def test_efforts_of_rows(self):
@@ -621,7 +621,7 @@ class TestWires:
         m.connect(m.world, Prismatic("x", axis="x"), n := m.add(Body("n", mass=1.0)))
         m.connect(n, Prismatic("z", axis="z", actuated=False), w)
         rail, gain = m.add(Rail("rail", w)), m.add(Gain("k", 1.0))
-        m.wire(rail.push, gain.u)
+        m.connect_signal(rail.push, gain.u)
         refused(AssemblyError, "rail.push", "forces that the motion itself", by=m.assemble)
 
     def test_a_sensor_on_a_joint_that_would_be_cut(self):
@@ -632,8 +632,8 @@ class TestWires:
             if wired:
                 m.add(JointSensor("enc", "j3"))
                 gain = m.add(Gain("k", -3.0))
-                m.wire("enc.q", gain.u)
-                m.wire(gain.y, m.add(JointEffort("effort", "j3")).tau)
+                m.connect_signal("enc.q", gain.u)
+                m.connect_signal(gain.y, m.add(JointEffort("effort", "j3")).tau)
             guess = {"j1": 1.0, "j2": -0.5}
             if systems:  # the spring at rest chose the configuration
                 names = (c.name for c in systems[0].coordinates)
@@ -648,7 +648,7 @@ class TestWires:
     def test_a_sensor_on_a_joint_that_is_cut(self):
         m = four_bar()
         m.add(JointSensor("enc", "j3"))
-        m.wire("enc.q", m.add(Gain("k", -3.0)).u)
+        m.connect_signal("enc.q", m.add(Gain("k", -3.0)).u)
         m.cut(m.components["j3"])
         refused(AssemblyError, "enc.q, whose joint 'j3' is cut", by=m.assemble)
 
@@ -657,7 +657,7 @@ class TestWires:
         m.add(JointSensor("enc", "j1"))
         m.add(AbsoluteSensor("tip", m.components["bar"].right))
         for name, source in (("q", "enc.q"), ("v", "enc.v"), ("x", "tip.p.x"), ("vy", "tip.v.y")):
-            m.wire(source, m.add(Gain(name, 2.0)).u)
+            m.connect_signal(source, m.add(Gain(name, 2.0)).u)
         result = mbs.simulate.run(m.assemble(), 0.5, q0={"j1": 0.4}, quiet=True)
         assert np.abs(result["q.y"] - 2 * result["j1.q"]).max() < 1e-12
         assert np.abs(result["v.y"] - 2 * result["j1.v"]).max() < 1e-12
@@ -697,7 +697,7 @@ class TestEnergiesOfInputs:
         m.add(AbsoluteSensor("tip", m.components["a"]))
         spring = m.add(kind("c", "jb", k=2.0))
         if source:
-            m.wire(source, spring.rest)
+            m.connect_signal(source, spring.rest)
         system = m.assemble()
         rest = {"enc.q": 0.3, "tip.R.xy": -np.sin(0.3), None: 0.7}[source]
         values = {"q": [0.3, 0.1], "v": [0.2, 0.0], "a": [0.0, 0.0], "z": [], "u": [0.7]}
@@ -1072,8 +1072,8 @@ class TestCopies:
     def test_deep_copies(self):
         m = pendulum(lambda tip: Actuator("a", tip))
         m.add(JointSensor("enc", "j1"))
-        m.wire("enc.q", m.add(Gain("gain", 2.0)).u)
-        m.wire("gain.y", m.components["a"].order)
+        m.connect_signal("enc.q", m.add(Gain("gain", 2.0)).u)
+        m.connect_signal("gain.y", m.components["a"].order)
         n = copy.deepcopy(m)
         m.add(Drag("late", m.components["bar"].right, c=1.0))
         one, two = m.assemble(), n.assemble()
@@ -1091,8 +1091,8 @@ class TestCopies:
         inner.add(JointSensor("enc", "j"))
         gain = inner.add(Gain("k", "-K"))
         force = inner.add(Pusher("push", "j"))
-        inner.wire("enc.q", gain.u)
-        inner.wire(gain.y, force.effort)
+        inner.connect_signal("enc.q", gain.u)
+        inner.connect_signal(gain.y, force.effort)
         m = mbs.Mechanism("two", gravity=(0, 0, 0))
         for side, x in (("left", -1.0), ("right", 1.0)):
             placed = m.add(inner, side)
@@ -1120,16 +1120,16 @@ class TestCopies:
         inner.connect(inner.world, Revolute("j", axis="z", actuated=False), bar.left)
         inner.add(Actuator("a", bar.right, time=0.2, force=1.0))
         follower = inner.add(Gain("k", 3.0))
-        inner.wire("a.force", follower.u)
+        inner.connect_signal("a.force", follower.u)
         m = mbs.Mechanism("outer", gravity=(0, 0, 0))
         for side in ("left", "right"):
             placed = m.add(inner, side)
             m.connect(m.world, placed.base)
-            m.wire(mbs.components.Constant(f"{side}.order", 5.0).y, placed["a"].order)
-        m.wire("left.k.y", m.add(Gain("sum", 2.0)).u)
+            m.connect_signal(mbs.components.Constant(f"{side}.order", 5.0).y, placed["a"].order)
+        m.connect_signal("left.k.y", m.add(Gain("sum", 2.0)).u)
         system = m.assemble()
         assert system.inputs == ()
-        assert list(system.z_start) == [1.0, 1.0]
+        assert list(system.component_start) == [1.0, 1.0]
         result = mbs.simulate.run(
             system, 0.3, z0={"right.a.force": 0.0}, tolerance=1e-10, quiet=True
         )
@@ -1180,12 +1180,12 @@ def test_ends_of_a_wire_have_one_unit():
     motor = m.add(DCMotor("motor", 1.0, 0.1, 0.2))
     m.connect(motor.flange, joint.flange)
     m.add(JointSensor("encoder", "j"))
-    m.wire("encoder.q", motor.voltage)
+    m.connect_signal("encoder.q", motor.voltage)
     refused(AssemblyError, "[rad] is wired to motor.voltage [V]", "a Gain", by=m.assemble)
     m.wires.clear()
     gain = m.add(Gain("gain", 2.0))
-    m.wire("encoder.q", gain.u)
-    m.wire(gain.y, motor.voltage)
+    m.connect_signal("encoder.q", gain.u)
+    m.connect_signal(gain.y, motor.voltage)
     assert m.assemble().inputs == ()
 
 

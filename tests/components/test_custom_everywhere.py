@@ -140,14 +140,19 @@ def pair(request):
 def points(system, count=5):
     """Configurations that close the loops, with random velocities and accelerations."""
     rng = np.random.default_rng(3)
-    n = len(system.active)
+    n = len(system.independent)
     for _ in range(count):
         q = np.array(mbs.loops.configuration.start(system, None, None, None)[0])
         if not system.is_closed:
             q = q + rng.uniform(-0.4, 0.4, system.nq)
         for part in mbs.assembly.tree.quaternion_slices(system.tree):
             q[part] /= np.linalg.norm(q[part])
-        yield q, rng.uniform(-1, 1, n), rng.uniform(-1, 1, n), rng.uniform(0, 2, system.z.numel())
+        yield (
+            q,
+            rng.uniform(-1, 1, n),
+            rng.uniform(-1, 1, n),
+            rng.uniform(0, 2, system.component_states.numel()),
+        )
 
 
 @pytest.mark.parametrize("name", ["inverse_dynamics", "direct_dynamics"])
@@ -174,7 +179,7 @@ def test_energy_is_that_of_the_package(pair):
 def test_energy_and_heat_stay_together(pair):
     """Along a motion the energy falls by what the damper has taken."""
     system = pair[0]
-    speed = {system.speeds[k].name: 0.7 for k in system.active[:1]}
+    speed = {system.velocity_coordinates[k].name: 0.7 for k in system.independent[:1]}
     result = mbs.simulate.run(system, 1.0, v0=speed, tolerance=1e-10, quiet=True)
     heat = result["damper.heat"]
     total = result["kinetic_energy"] + result["potential_energy"] + heat

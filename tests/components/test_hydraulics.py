@@ -59,15 +59,15 @@ def press(meters=False, wired=True, **changed):
     c = m.add(HydraulicCylinder("cyl", m.world, ram, **cylinder(**changed)))
     if wired:
         valve = m.add(HydraulicValve("valve", RATED_FLOW, RATED_DROP, SUPPLY))
-        m.wire(valve.flow_a, c.flow_a)
-        m.wire(valve.flow_b, c.flow_b)
-        m.wire("cyl.p_a", valve.p_a)
-        m.wire("cyl.p_b", valve.p_b)
+        m.connect_signal(valve.flow_a, c.flow_a)
+        m.connect_signal(valve.flow_b, c.flow_b)
+        m.connect_signal("cyl.p_a", valve.p_a)
+        m.connect_signal("cyl.p_b", valve.p_b)
     if meters:
         for side in "ab":
             meter = m.add(OilMeter(f"meter_{side}", BULK))
-            m.wire(getattr(valve, f"flow_{side}"), meter.flow)
-            m.wire(f"cyl.p_{side}", meter.p)
+            m.connect_signal(getattr(valve, f"flow_{side}"), meter.flow)
+            m.connect_signal(f"cyl.p_{side}", meter.p)
     return m.assemble(guess={"x": 0.4})
 
 
@@ -154,7 +154,9 @@ class TestCylinder:
         system = press(wired=False, leakage=1e-13)
         v, p_a, p_b = 0.1, 8e6, 8e6
         at = PartsAt(system, q := casadi.SX.sym("q"), w := casadi.SX.sym("v"))
-        find = casadi.Function("f", [q, w, system.z, system.u], [at.rates(), at.outputs()])
+        find = casadi.Function(
+            "f", [q, w, system.component_states, system.u], [at.rates(), at.outputs()]
+        )
         leak = 0.0
         rates, force = find(0.5, v, [p_a, p_b], [AREA_A * v + leak, -AREA_B * v - leak])
         assert np.abs(np.array(rates)).max() < 1e-6
@@ -181,7 +183,9 @@ class TestCylinder:
         m.add(HydraulicCylinder("cyl", m.world, ram, **cylinder()))
         system = m.assemble()
         at = PartsAt(system, q := casadi.SX.sym("q"), v := casadi.SX.sym("v"))
-        f = casadi.Function("f", [q, v, system.z], [at.outputs(), casadi.gradient(at.energy(), q)])
+        f = casadi.Function(
+            "f", [q, v, system.component_states], [at.outputs(), casadi.gradient(at.energy(), q)]
+        )
         for x in (0.29995, 0.2995, 0.5, 0.80004, 0.801):
             force, slope = f(x, 0.0, [0.0, 0.0])
             assert float(force) == pytest.approx(-float(slope), rel=1e-12, abs=1e-12)

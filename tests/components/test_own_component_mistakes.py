@@ -161,17 +161,17 @@ def test_wires_by_names_into_placed_mechanisms():
         return m
 
     one, two = leg(), mbs.Mechanism("two", gravity=(0, 0, 0))
-    one.wire("act.angle", "act.order")
+    one.connect_signal("act.angle", "act.order")
     for side in ("left", "right"):
         two.connect(two.world, two.add(leg(), side).base)
     refused(
         DescriptionError,
         "two: a wire leads to 'left.act.ordr'",
         "left.act.order",
-        by=lambda: two.wire("right.act.angle", "left.act.ordr"),
+        by=lambda: two.connect_signal("right.act.angle", "left.act.ordr"),
     )
-    two.wire("right.act.angle", "left.act.order")
-    two.wire("left.act.angle", "right.act.order")
+    two.connect_signal("right.act.angle", "left.act.order")
+    two.connect_signal("left.act.angle", "right.act.order")
     system = two.assemble()
     assert system.inputs == ()
     start = {"left.j": 0.3, "right.j": 0.3}
@@ -278,7 +278,7 @@ def test_the_coordinate_of_a_motion_is_independent():
     body = m.add(Body("bar", mass=1.0, inertia=(INERTIA, INERTIA, INERTIA)))
     m.connect(m.world, Track("track"), body)
     system = m.assemble()
-    assert [system.speeds[k].name for k in system.closure.active] == ["track.s"]
+    assert [system.velocity_coordinates[k].name for k in system.closure.independent] == ["track.s"]
     # at s = 0 with the rate v the speed is v / 2, and the tension v^2 has no part along the track
     q = [1.0, 0, 0, 1, 0, 0, 0, 0]
     assert float(mbs.models.direct_dynamics(system)(q, 2.0, 0.0)) == pytest.approx(0, abs=1e-12)

@@ -28,9 +28,9 @@ def plant(**limits):
     m.connect(source.flange, joint.flange)
     m.add(JointSensor("encoder", "j"))
     pid = m.add(SampledPID("pid", PERIOD, kp=3.0, ki=0.8, kd=1.2, **limits))
-    m.wire("encoder.q", pid.measured)
-    m.wire(m.add(Constant("target", TARGET)).y, pid.target)
-    m.wire(pid.u, source.tau)
+    m.connect_signal("encoder.q", pid.measured)
+    m.connect_signal(m.add(Constant("target", TARGET)).y, pid.target)
+    m.connect_signal(pid.u, source.tau)
     return m.assemble()
 
 
@@ -87,8 +87,8 @@ def test_sample_and_hold_keeps_what_it_saw():
     m.connect(motor.flange, joint.flange)
     lag = m.add(FirstOrder("lag", time=0.5))
     hold = m.add(SampleHold("hold", 0.2))
-    m.wire(m.add(Constant("one", 1.0)).y, lag.u)
-    m.wire(lag.y, hold.u)
+    m.connect_signal(m.add(Constant("one", 1.0)).y, lag.u)
+    m.connect_signal(lag.y, hold.u)
     result = mbs.simulate.run(m.assemble(), 0.95, step=0.05, quiet=True)
     looks = 0.2 * np.floor(result.time / 0.2 + 1e-9)
     inside = np.abs(result.time - looks) > 0.01

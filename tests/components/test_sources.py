@@ -31,7 +31,7 @@ def driven(*sources, torque=None, symbols=()):
     for source in sources:
         m.add(source)
     if torque is not None:
-        m.wire(torque, drive.tau)
+        m.connect_signal(torque, drive.tau)
     for symbol in symbols:
         m.values[symbol.name] = symbol
     return m.assemble()
@@ -284,7 +284,7 @@ def filtered():
     m.connect(drive.flange, shaft.flange_a)
     m.add(pulse)
     m.add(smooth)
-    m.wire(pulse.y, smooth.u)
+    m.connect_signal(pulse.y, smooth.u)
     return m.assemble(), smooth
 
 

@@ -39,7 +39,7 @@ def mechanism(*, closed):
     m.add(WrenchSensor("force", "j", axes="world"))
     m.add(AbsoluteSensor("tip", b.at(1.0)))
     for name, source in WIRES.items():
-        m.wire(source, m.add(FirstOrder(name, time=TIME)).u)
+        m.connect_signal(source, m.add(FirstOrder(name, time=TIME)).u)
     return m
 
 
@@ -91,8 +91,8 @@ def test_a_falling_mass():
     m.connect(m.world, Prismatic("z", axis="z"), m.add(Body("w", mass=2.0)))
     m.add(JointSensor("s", "z"))
     gain, lag = m.add(Gain("g", 2.0)), m.add(FirstOrder("lag", time=TIME))
-    m.wire("s.a", gain.u)
-    m.wire(gain.y, lag.u)
+    m.connect_signal("s.a", gain.u)
+    m.connect_signal(gain.y, lag.u)
     result = mbs.simulate.run(m.assemble(), 0.3, tolerance=1e-10, quiet=True)
     wanted = -2 * 9.81 * (1 - np.exp(-result.time / TIME))
     np.testing.assert_allclose(result["lag.x"], wanted, atol=1e-7)

@@ -51,7 +51,7 @@ def started(system, speeds, end=1.0):
     names = [c.name for c in system.coordinates]
     ran = mbs.simulate.run(system, end, v0=speeds, tolerance=1e-10, quiet=True)
     start = {f"{name}.q": x for name, x in zip(names, ran.values[0], strict=False)}
-    start |= {f"{s.name}.v": ran[f"{s.name}.v"][0] for s in system.speeds}
+    start |= {f"{s.name}.v": ran[f"{s.name}.v"][0] for s in system.velocity_coordinates}
     return ran, start
 
 
@@ -72,7 +72,7 @@ def of_states(path, start):
 def same_motion(system, ran, got, tolerance):
     for c in system.coordinates:
         np.testing.assert_allclose(got[f"{c.name}.q"], ran[f"{c.name}.q"], atol=tolerance)
-    for s in system.speeds:
+    for s in system.velocity_coordinates:
         np.testing.assert_allclose(got[f"{s.name}.v"], ran[f"{s.name}.v"], atol=20 * tolerance)
     joints = {c.joint for c in system.coordinates if c.kind == "quaternion"}
     for joint in joints:
@@ -90,7 +90,7 @@ KINDS = ["CoSimulation", "ModelExchange"]
 
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 def test_a_rod_that_spins_between_two_balls(system, tmp_path, fmi):
-    assert "ball.wx" in [system.speeds[k].name for k in system.active]
+    assert "ball.wx" in [system.velocity_coordinates[k].name for k in system.independent]
     ran, start = started(system, SPEEDS)
     path = mbs.export.fmu(system, tmp_path / "leg.fmu", fmi=fmi, outputs=["energy", "closure"])
     chosen = of_states(path, start)
@@ -106,7 +106,7 @@ def test_a_rod_that_spins_between_two_balls(system, tmp_path, fmi):
 def test_on_a_floating_base(tmp_path, kind):
     """All of the base is independent, of the ball its spin alone."""
     system = leg(base=Free("base"))
-    active = {system.speeds[k].name for k in system.active}
+    active = {system.velocity_coordinates[k].name for k in system.independent}
     assert {"base.wx", "base.wy", "base.wz", "base.vx"} < active
     speeds = {"base.wx": 1.0, "base.vz": 0.3, **SPEEDS}
     ran, start = started(system, speeds)

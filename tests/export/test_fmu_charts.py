@@ -77,7 +77,7 @@ def test_the_motion_is_that_of_a_simulation(made, name):
     shown = mbs.simulate.run(system, 1.5, v0=v0, tolerance=1e-10, step=0.02, quiet=True)
     result = fmu(path, 1.5, start=start, kind="ModelExchange", tolerance=1e-11, step=0.02)
     rows = np.searchsorted(result.time, shown.time - 1e-9)  # events have rows of their own
-    for speed in system.speeds:
+    for speed in system.velocity_coordinates:
         for end, size in (("q", 1e-4), ("v", 1e-2)):
             name = f"{speed.name}.{end}"
             assert result[name][rows] == pytest.approx(shown[name], abs=size)

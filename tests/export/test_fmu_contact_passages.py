@@ -66,7 +66,7 @@ def test_events_and_motion_are_those_of_a_simulation(made, name):
     assert shown.events
     result = moved(made[name], 1e-10)
     rows = last_rows(result, shown.time)
-    for speed in system.speeds:
+    for speed in system.velocity_coordinates:
         assert result[f"{speed.name}.q"][rows] == pytest.approx(shown[f"{speed.name}.q"], abs=1e-6)
         assert result[f"{speed.name}.v"][rows] == pytest.approx(shown[f"{speed.name}.v"], abs=1e-4)
     assert result[f"{name}.mode"][rows] == pytest.approx(shown[f"{name}.mode"])

@@ -244,14 +244,14 @@ def test_a_law_drives_the_joints_whose_motion_is_no_input() -> None:
 
 def test_a_law_sees_the_whole_tree_of_a_closed_system() -> None:
     system = catalogue_system("four_bar")
-    driven = [speed.name for speed in system.speeds].index("j1")
+    driven = [speed.name for speed in system.velocity_coordinates].index("j1")
     model = fmu_model(system, FmuOptions(controller=lambda t, q, v: [-3 * sum(q.nz) - v[0], 0, 0]))
     plain = fmu_model(system)
     q, v = np.array(system.configuration), 0.4
     z = [q[k] for k in range(3) if k != driven]
     x = [q[driven], v]
     speeds = _values(plain, plain.rhs(0, x, z, [0], [])[1])
-    tau = -3 * q.sum() - (v if driven == 0 else speeds[f"{system.speeds[0].name}.v"])
+    tau = -3 * q.sum() - (v if driven == 0 else speeds[f"{system.velocity_coordinates[0].name}.v"])
     one, other = model.rhs(0, x, z, [], []), plain.rhs(0, x, z, [tau], [])
     assert np.abs(np.array(one[0] - other[0])).max() < 1e-9
     assert abs(_values(model, one[1])["j1.tau"] - tau) < 1e-12

@@ -130,9 +130,9 @@ def test_a_step_source_ends_a_step(tmp_path, kind, solver):
     up, down = m.add(Step("up", 2.0, 5.003)), m.add(Step("down", 2.0, 5.013))
     total = m.add(Sum("total"))
     m.connect(torque.flange, inertia.flange_a)
-    m.wire(up.y, total.u1)
-    m.wire(down.y, total.u2)
-    m.wire(total.y, torque.tau)
+    m.connect_signal(up.y, total.u1)
+    m.connect_signal(down.y, total.u2)
+    m.connect_signal(total.y, torque.tau)
     path = tmp_path / "shaft.fmu"
     mbs.export.fmu(m.assemble(), path, solver=solver)
     assert last(path, 10.0, "i.v", kind) == pytest.approx(0.02, abs=1e-6)

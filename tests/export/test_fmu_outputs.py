@@ -61,9 +61,9 @@ def test_poses_and_cut_forces_are_those_of_the_models(run):
             [own[f"{x.name}.{kind}"][row] for x in rows]
             for kind, rows in (
                 ("q", system.coordinates),
-                ("v", system.speeds),
-                ("a", system.speeds),
-                ("tau", system.speeds),
+                ("v", system.velocity_coordinates),
+                ("a", system.velocity_coordinates),
+                ("tau", system.velocity_coordinates),
             )
         )
         F = np.array(mbs.models.joint_wrenches(system, "tree")(q, v, a, tau))

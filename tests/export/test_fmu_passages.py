@@ -49,7 +49,7 @@ def test_the_motion_is_that_of_a_simulation(made, name):
     v0 = {key.removesuffix(".v"): value for key, value in start.items()}
     shown = mbs.simulate.run(system, 1.5, v0=v0, tolerance=1e-10, step=0.02, quiet=True)
     result = fmu(made[name], 1.5, start=start, tolerance=1e-10, step=0.02)
-    for speed in system.speeds:
+    for speed in system.velocity_coordinates:
         assert result[f"{speed.name}.q"] == pytest.approx(shown[f"{speed.name}.q"], abs=1e-5)
         assert result[f"{speed.name}.v"] == pytest.approx(shown[f"{speed.name}.v"], abs=1e-3)
 

@@ -45,9 +45,12 @@ def made(tmp_path_factory):
 
 def given(system, position, v, count):
     """Starts of the FMU: of the independent joint, and of as many velocities as are set."""
-    (k,) = system.active
-    first = {f"{system.speeds[k].name}.q": position, f"{system.speeds[k].name}.v": v[k]}
-    named = [f"{speed.name}.v" for speed in system.speeds][:count]
+    (k,) = system.independent
+    first = {
+        f"{system.velocity_coordinates[k].name}.q": position,
+        f"{system.velocity_coordinates[k].name}.v": v[k],
+    }
+    named = [f"{speed.name}.v" for speed in system.velocity_coordinates][:count]
     return first | dict(zip(named, v, strict=False))
 
 
@@ -61,7 +64,7 @@ def test_a_start_with_velocities_of_one_branch_moves_as_a_simulation(made, case,
     start = given(system, position, v, count)
     result = fmu(path, 1.0, start=start, tolerance=1e-9, step=0.02, kind=kind, quiet=True)
     rows = np.searchsorted(result.time, shown.time - 1e-9)
-    for speed, velocity in zip(system.speeds, v, strict=True):
+    for speed, velocity in zip(system.velocity_coordinates, v, strict=True):
         got = result[f"{speed.name}.q"][rows]
         assert got == pytest.approx(shown[f"{speed.name}.q"], abs=1e-6)
         assert result[f"{speed.name}.v"][0] == pytest.approx(velocity, abs=3e-6)
@@ -78,7 +81,7 @@ def test_accelerations_of_a_start_are_those_of_the_branch(made, case, kind):
     system, path = made[name]
     start = given(system, position, v, count)
     result = fmu(path, 1e-2, start=start, tolerance=1e-11, step=1e-3, kind=kind, quiet=True)
-    for speed in system.speeds:
+    for speed in system.velocity_coordinates:
         fit = np.polynomial.Polynomial.fit(result.time, result[f"{speed.name}.v"], 4)
         assert result[f"{speed.name}.a"][0] == pytest.approx(fit.deriv()(0.0), abs=2e-2)
 

@@ -61,7 +61,7 @@ def test_steps_from_c_are_those_of_fmpy(tmp_path, name, fmi):
     system = build()
     path = mbs.export.fmu(system, tmp_path / "x.fmu", fmi=fmi, outputs=["energy"])
     unpacked, instance = begun(path, fmi, start, tmp_path / "x")
-    joints = [f"{speed.name}.{end}" for speed in system.speeds for end in ("q", "v")]
+    joints = [f"{speed.name}.{end}" for speed in system.velocity_coordinates for end in ("q", "v")]
     names = ["energy.kinetic", "energy.potential", *joints]
     rows = stepped(unpacked, fmi, start, names, tmp_path)
     assert len(rows) == STEPS

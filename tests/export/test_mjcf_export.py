@@ -94,7 +94,9 @@ def test_a_tree_comes_back(tmp_path):
     names = [c.name.replace(".s", "_s").replace(".phi", "_phi") for c in system.coordinates]
     assert [c.name for c in back.coordinates] == names
     assert [c.limits for c in back.coordinates] == [c.limits for c in system.coordinates]
-    assert [s.effort for s in back.speeds] == [s.effort for s in system.speeds]
+    assert [s.effort for s in back.velocity_coordinates] == [
+        s.effort for s in system.velocity_coordinates
+    ]
     q, v, a = state(system)
     assert close(values(inertia_matrix(system), q), values(inertia_matrix(back), q))
     assert close(values(inverse_dynamics(system), q, v, a), values(inverse_dynamics(back), q, v, a))
@@ -110,9 +112,11 @@ def test_robots_come_back(tmp_path, robot):
     system = catalogue_system(robot)
     mbs.export.mjcf(system, tmp_path / "m.xml")
     back = mbs.load(tmp_path / "m.xml").assemble()
-    driven = [s.actuated for s in system.speeds]
+    driven = [s.actuated for s in system.velocity_coordinates]
     # a file without actuators does not say which joints are driven
-    assert [s.actuated for s in back.speeds] == (driven if any(driven) else [True] * len(driven))
+    assert [s.actuated for s in back.velocity_coordinates] == (
+        driven if any(driven) else [True] * len(driven)
+    )
     q, v, a = state(system)
     assert close(values(inertia_matrix(system), q), values(inertia_matrix(back), q))
     assert close(values(inverse_dynamics(system), q, v, a), values(inverse_dynamics(back), q, v, a))

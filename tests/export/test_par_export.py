@@ -171,7 +171,7 @@ def test_closed_loops_keep_their_cuts_and_configuration(tmp_path):
     mbs.export.par(system, tmp_path / "four_bar.par")
     after = mbs.load(tmp_path / "four_bar.par").assemble()
     assert after.is_closed
-    assert len(after.active) == len(system.active) == 1
+    assert len(after.independent) == len(system.independent) == 1
     np.testing.assert_allclose(after.configuration, system.configuration, atol=1e-9)
     ours, theirs = (
         mbs.models.inverse_dynamics(s)(s.configuration, 0.7, -0.4) for s in (system, after)

@@ -90,8 +90,8 @@ def test_a_coupling_of_degree_one_is_a_mimic(tmp_path):
 def closed_values(system):
     """Efforts, accelerations and poses by name, at a closed state, and the mobility."""
     q = system.configuration
-    names = names_of(system.speeds)
-    active, motors = ([names[k] for k in ks] for ks in (system.active, system.motors))
+    names = names_of(system.velocity_coordinates)
+    active, motors = ([names[k] for k in ks] for ks in (system.independent, system.motors))
     rng = np.random.default_rng(4)
     v, a, u = (dict(zip(sorted(names), rng.uniform(-1, 1, len(names)), strict=True)) for _ in "vau")
     speeds = [v[name] for name in active]
@@ -122,7 +122,7 @@ CLOSED = ["four_bar", "five_bar", "slider_crank", "sr400", "akr3000", "bricard",
 @pytest.mark.parametrize("name", CLOSED)
 def test_loops_are_joints_with_a_second_parent(tmp_path, name):
     one = catalogue_system(name)
-    active = [one.speeds[k].name.replace(".", "_") for k in one.active]
+    active = [one.velocity_coordinates[k].name.replace(".", "_") for k in one.independent]
     other = again(one, tmp_path).assemble(active=active)
     assert other.closure.residual < CLOSE
     assert {c.edge.joint.name for c in other.cuts} == {c.edge.joint.name for c in one.cuts}

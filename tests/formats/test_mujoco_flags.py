@@ -186,7 +186,7 @@ def test_actuators_and_what_they_can_give(tmp_path, flags, groups, actuated, eff
     text = text_of(flags=flags, option=groups, more=MOTORS)
     mechanism = read(tmp_path, text)
     assert [joint.actuated for joint in mechanism.joints()] == actuated
-    assert [speed.effort for speed in mechanism.assemble().speeds] == efforts
+    assert [speed.effort for speed in mechanism.assemble().velocity_coordinates] == efforts
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     data.ctrl[:] = 100.0

@@ -65,7 +65,7 @@ def same(one, other, seed=0, frames=None):
     names = [c.name for c in one.coordinates]
     assert [c.name for c in other.coordinates] == names
     rng = np.random.default_rng(seed)
-    q, (v, a) = rng.uniform(-1, 1, one.nq), rng.uniform(-1, 1, (2, len(one.active)))
+    q, (v, a) = rng.uniform(-1, 1, one.nq), rng.uniform(-1, 1, (2, len(one.independent)))
     for k, name in enumerate(names):
         if name.endswith("qw"):
             q[k : k + 4] /= np.linalg.norm(q[k : k + 4])
@@ -324,7 +324,7 @@ def test_a_screw_advances_by_its_pitch(read, text, pitch):
     # kinetic energy of one degree of freedom: 0.3 of the turn and 2 kg along the thread
     M = np.array(mbs.models.inertia_matrix(system, coordinates="independent")(q))
     lead = pitch / (2 * math.pi)
-    k = [system.speeds[i].name for i in system.active].index("k")
+    k = [system.velocity_coordinates[i].name for i in system.independent].index("k")
     assert M[k, k] == pytest.approx(0.3 + 2 * lead**2, rel=CLOSE)
 
 

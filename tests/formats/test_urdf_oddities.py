@@ -258,7 +258,7 @@ def test_notes(urdf, case):
         assert part in text
     # Whatever was noted, the inverse dynamics is defined.
     system = mechanism.assemble()
-    n = len(system.active)
+    n = len(system.independent)
     tau = np.array(mbs.models.inverse_dynamics(system)([0.1] * system.nq, [0.2] * n, [1] * n))
     assert np.all(np.isfinite(tau))
     assert np.any(tau)

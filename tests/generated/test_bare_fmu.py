@@ -179,8 +179,8 @@ def moved(instance, fmi, references, names, inputs, steps):
 def test_a_motion_has_the_bits_of_the_hosted_fmu(name, fmi, unpacked):
     system = catalogue_system(name)
     shown = [f"{c.name}.q" for c in system.coordinates]
-    shown += [f"{s.name}.{kind}" for kind in "va" for s in system.speeds]
-    efforts = [f"{s.name}.tau" for s in system.speeds if s.name in _driven(system)]
+    shown += [f"{s.name}.{kind}" for kind in "va" for s in system.velocity_coordinates]
+    efforts = [f"{s.name}.tau" for s in system.velocity_coordinates if s.name in _driven(system)]
     rng = np.random.default_rng(5)
     inputs, steps = rng.uniform(-2, 2, (150, len(efforts))), rng.uniform(0.0004, 0.012, 150)
     rows = []

@@ -185,7 +185,7 @@ def fmu_motion(system, folder, h, inputs, start=()):
     fmu.exitInitializationMode()
     efforts = [v.valueReference for v in description.modelVariables if v.causality == "input"]
     joints = [f"{c.name}.q" for c in system.coordinates]
-    joints += [f"{s.name}.{kind}" for kind in "va" for s in system.speeds]
+    joints += [f"{s.name}.{kind}" for kind in "va" for s in system.velocity_coordinates]
     time, rows = 0.0, []
     for u in inputs:
         fmu.setReal(efforts, list(u))
@@ -255,7 +255,9 @@ def test_a_body_that_floats_is_that_of_an_fmu(tmp_path):
     for u in efforts(1, 100):
         ours.append(stepped(motion, 0.005, [u])[0])
         states.append(motion.state[1 : 1 + x.size].copy())
-    names = [f"{c.name}.q" for c in system.coordinates] + [f"{s.name}.v" for s in system.speeds]
+    names = [f"{c.name}.q" for c in system.coordinates] + [
+        f"{s.name}.v" for s in system.velocity_coordinates
+    ]
     start = dict(zip(names, turned, strict=True))
     theirs = fmu_motion(system, tmp_path, 0.005, efforts(1, 100), start)
     np.testing.assert_array_equal(np.array(states), theirs[:, : x.size])

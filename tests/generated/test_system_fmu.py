@@ -80,7 +80,9 @@ def test_importer_agrees_with_simulation(case, kind):
     fmu = mbs.simulate.fmu(
         path, duration, start=start, kind=kind, tolerance=TOLERANCE, step=0.01, quiet=True
     )
-    names = [f"{c.name}.q" for c in system.coordinates] + [f"{s.name}.v" for s in system.speeds]
+    names = [f"{c.name}.q" for c in system.coordinates] + [
+        f"{s.name}.v" for s in system.velocity_coordinates
+    ]
     worst = max(np.abs(fmu[name] - result[name]).max() for name in names)
     assert worst < 1e-6
 

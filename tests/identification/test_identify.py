@@ -215,8 +215,12 @@ def samples_of(system, run):
     """Every row of a simulation; its efforts are those of the motors."""
     q, v, a = (
         np.column_stack([run[f"{c.name}.{x}"] for c in table])
-        for x, table in (("q", system.coordinates), ("v", system.speeds), ("a", system.speeds))
+        for x, table in (
+            ("q", system.coordinates),
+            ("v", system.velocity_coordinates),
+            ("a", system.velocity_coordinates),
+        )
     )
-    names = tuple(system.speeds[k].name for k in system.active)
+    names = tuple(system.velocity_coordinates[k].name for k in system.independent)
     tau = np.column_stack([run[f"{name}.tau"] for name in names])
     return Samples(run.time, q, v, a, tau, names, ("N.m",) * len(names))

@@ -52,7 +52,7 @@ def symbol():
 
 def record(system):
     """Efforts by the model along a motion of the independent joints, with a little noise."""
-    w = np.array([2.0, 3.1, 4.3])[: len(system.active), None]
+    w = np.array([2.0, 3.1, 4.3])[: len(system.independent), None]
     q, v, a = np.sin(w * TIME).T, (w * np.cos(w * TIME)).T, (-(w**2) * np.sin(w * TIME)).T
     idm = mbs.models.inverse_dynamics(system)
     whole = ident.leading.positions(system, q)

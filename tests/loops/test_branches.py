@@ -30,7 +30,13 @@ def by_name(system, q):
 @pytest.mark.parametrize("name", CLOSED)
 def test_a_complete_closed_configuration_is_accepted_as_it_is(name):
     system = catalogue_system(name)
-    motion = run(system, 0.6, step=0.1, v0={system.speeds[system.active[0]].name: 0.3}, quiet=True)
+    motion = run(
+        system,
+        0.6,
+        step=0.1,
+        v0={system.velocity_coordinates[system.independent[0]].name: 0.3},
+        quiet=True,
+    )
     for row in range(len(motion)):
         q = np.array([motion[f"{c.name}.q"][row] for c in system.coordinates])
         for given in (by_name(system, q), list(q), q):

@@ -53,7 +53,7 @@ def test_direct_dynamics(closed):
     q = np.array(closed.configuration)
     ddm = mbs.models.direct_dynamics(closed)
     in_tree = mbs.models.direct_dynamics(closed, coordinates="tree")
-    active = list(closed.active)
+    active = list(closed.independent)
     G = np.array(reduction_matrix(closed)(q))
     for _ in range(3):
         v_a = rng.uniform(-1, 1, len(active))
@@ -73,8 +73,8 @@ def test_direct_dynamics(closed):
 def test_closed_matrices_agree(closed):
     rng = np.random.default_rng(1)
     q = np.array(closed.configuration)
-    v_a = rng.uniform(-1, 1, len(closed.active))
-    a_a = rng.uniform(-1, 1, len(closed.active))
+    v_a = rng.uniform(-1, 1, len(closed.independent))
+    a_a = rng.uniform(-1, 1, len(closed.independent))
     A = np.array(mbs.models.inertia_matrix(closed)(q))
     H = np.array(mbs.models.bias(closed)(q, v_a)).ravel()
     tau = np.array(mbs.models.inverse_dynamics(closed)(q, v_a, a_a)).ravel()
@@ -85,8 +85,10 @@ def test_closed_matrices_agree(closed):
 
 
 def test_solve_keeps_what_is_given(closed):
-    names = [closed.speeds[k].name for k in closed.active]
-    values = {name: closed.configuration[closed.active[i]] + 0.01 for i, name in enumerate(names)}
+    names = [closed.velocity_coordinates[k].name for k in closed.independent]
+    values = {
+        name: closed.configuration[closed.independent[i]] + 0.01 for i, name in enumerate(names)
+    }
     q = solve(closed, values)
     for name, value in values.items():
         k = [c.name for c in closed.coordinates].index(name)

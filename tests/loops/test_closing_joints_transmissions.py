@@ -185,7 +185,7 @@ def test_a_planetary_gear_adds_two_coordinates():
     q = solve(system, {"sun_axis": 0.4, "ring_axis": -0.2})
     names = [c.name for c in system.coordinates]
     assert q[names.index("carrier_axis")] == pytest.approx(0.1 + 0.25 * 0.4 - 0.75 * 0.2, abs=1e-14)
-    active = [system.speeds[k].name for k in system.active]
+    active = [system.velocity_coordinates[k].name for k in system.independent]
     factors = np.array([{"sun_axis": 0.25, "ring_axis": 0.75}[name] for name in active])
     own = np.array([{"sun_axis": 0.02, "ring_axis": 0.3}[name] for name in active])
     A = np.array(mbs.models.inertia_matrix(system)(q))

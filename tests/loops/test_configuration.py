@@ -140,7 +140,8 @@ def test_a_parallelogram_goes_straight_through_its_flat_configuration(q7):
     assert q[2] == pytest.approx(np.pi / 2 - q[1] + q7, abs=1e-9)
     assert q[7] == pytest.approx(q[1] - q7, abs=1e-9)
     active = [
-        q[[c.name for c in system.coordinates].index(system.speeds[k].name)] for k in system.active
+        q[[c.name for c in system.coordinates].index(system.velocity_coordinates[k].name)]
+        for k in system.independent
     ]
     T = np.array(mbs.models.direct_geometry(system, 8)(active))
     np.testing.assert_allclose(T, np.array(mbs.models.transform(system, 8)(q)), atol=1e-9)

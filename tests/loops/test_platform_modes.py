@@ -108,7 +108,7 @@ def test_one_loop_of_six_unknown_joints(kinds, seed):
     assert found.proof.endswith(f"certified: {count} of {count} roots")
     assert len(found) in range(1, 17)
     # elsewhere the arm is the same one and its target another
-    q_a = np.array(found[0].q)[list(system.free)] + 0.05
+    q_a = np.array(found[0].q)[list(system.chosen_coordinates)] + 0.05
     found = assembly_modes(system, q_a)
     for q in searched(system, q_a, starts=15):
         assert any(same(system, q, mode.q) for mode in found)
@@ -330,7 +330,12 @@ def test_a_platform_on_similar_hexagons_has_other_independent_joints():
     a = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(6)])
     # five legs are independent, so that a joint of the sixth one stands for its motor
     system = hexapod(1, "UPS", (a, 0.5 * a)).assemble()
-    assert len([k for k in system.active if system.speeds[k].name.startswith("leg")]) == 5
+    assert (
+        len(
+            [k for k in system.independent if system.velocity_coordinates[k].name.startswith("leg")]
+        )
+        == 5
+    )
     refused(
         NoClosedForm,
         "hexapod1: the ends of its six legs lie so that they hold the platform at no pose, as on"

@@ -30,7 +30,7 @@ def moved(system, away, seed):
     """A closed configuration whose independent joints stand elsewhere."""
     rng = np.random.default_rng(seed)
     names = [c.name for c in system.coordinates]
-    free = [system.speeds[k].name for k in system.free]
+    free = [system.velocity_coordinates[k].name for k in system.chosen_coordinates]
     return mbs.loops.solve(
         system, {n: system.configuration[names.index(n)] + rng.uniform(-away, away) for n in free}
     )

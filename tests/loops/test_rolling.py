@@ -29,8 +29,8 @@ def rolling_disc():
 
 def test_a_disc_has_three_velocities_and_five_positions():
     system = rolling_disc()
-    assert len(system.active) == 3
-    assert len(system.free) == 5
+    assert len(system.independent) == 3
+    assert len(system.chosen_coordinates) == 5
     assert system.loops[0].rows == ("force normal", "slip x", "slip y")
     assert system.loops[0].dropped == ()
 
@@ -73,8 +73,8 @@ def rotation(quaternion):
 def test_a_leaning_disc_follows_the_equations_of_routh(lean, yaw_rate, lean_rate, spin):
     """Moments about the contact, with the angles yaw, lean and spin about the disc's own axis."""
     system = disc_by_angles()
-    names = [speed.name for speed in system.speeds]
-    active = [names[k] for k in system.active]
+    names = [speed.name for speed in system.velocity_coordinates]
+    active = [names[k] for k in system.independent]
     assert set(active) == {"yaw", "lean", "spin"}
     q = np.array(system.configuration)
     q[names.index("lean")], q[names.index("z")] = lean, RADIUS * math.cos(lean)
@@ -139,9 +139,9 @@ def test_inverse_and_direct_models_agree():
     G = np.array(mbs.loops.reduction_matrix(system)(system.configuration))
     J = np.array(mbs.loops.closure_jacobian(system)(system.configuration))
     forces = np.zeros(system.nv)
-    forces[list(system.active)] = tau
+    forces[list(system.independent)] = tau
     a_tree, lam = whole(system.configuration, G @ v, forces)
-    assert np.array(a_tree).ravel()[list(system.active)] == pytest.approx(np.array(a).ravel())
+    assert np.array(a_tree).ravel()[list(system.independent)] == pytest.approx(np.array(a).ravel())
     assert lam.numel() == len(J) == 3
     assert pytest.approx(np.zeros((3, 3)), abs=1e-12) == J @ G
 
@@ -169,8 +169,8 @@ def test_a_plane_carriage_on_one_wheel_turns_and_rolls():
     m.connect(frame.at(0, 0, 0.2), Revolute("spin", axis="y", actuated=True), wheel)
     m.connect(m.world, RollingDisc("contact", radius=0.2), wheel)
     system = m.assemble()
-    assert len(system.active) == 2
-    names = [speed.name for speed in system.speeds if speed.joint == "base"]
+    assert len(system.independent) == 2
+    names = [speed.name for speed in system.velocity_coordinates if speed.joint == "base"]
     v0 = {"spin": 2.0, names[-1]: 0.5}
     result = mbs.simulate.run(system, 2.0, v0=v0, tau={"spin": 0.0}, quiet=True)
     x, y = (result[f"{name}.q"] for name in names[:2])
@@ -202,7 +202,7 @@ def linearised_bicycle(speed):
     """A, and K and C of A a = K q + C v, for lean and steer about straight running."""
     system = catalogue_system("whipple_bicycle")
     names = [c.name for c in system.coordinates]
-    active = [system.speeds[k].name for k in system.active]
+    active = [system.velocity_coordinates[k].name for k in system.independent]
     q, v = SX.sym("q", system.nq), SX.sym("v", 3)
     a = mbs.models.direct_dynamics(system)(q, v, SX.zeros(3))
     slopes = Function("slopes", [q, v], [a, casadi.jacobian(a, q), casadi.jacobian(a, v)])

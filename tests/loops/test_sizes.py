@@ -85,7 +85,7 @@ def test_a_slider_crank_of_any_size_follows_its_branch(size, driven):
 def test_all_sizes_close_alike(scaled):
     _, system = scaled
     like = four_bar(1.0)
-    assert system.closure.active == like.closure.active
+    assert system.closure.independent == like.closure.independent
     assert system.closure.mobility == 1
     np.testing.assert_allclose(system.configuration, like.configuration, atol=1e-11)
     np.testing.assert_allclose(solve(system, [0.7]), solve(like, [0.7]), atol=1e-11)

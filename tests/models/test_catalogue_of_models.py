@@ -47,7 +47,7 @@ def test_the_default_part_of_a_jacobian_has_an_inverse(systems, name, frame, row
     elif name == "sr400":
         q = mbs.loops.solve(system, {"q4": 0.4, "q5": 0.7})
     J = np.array(mbs.models.jacobian(system, frame)(q)).reshape(6, -1)
-    names = [system.speeds[k].name for k in system.active]
+    names = [system.velocity_coordinates[k].name for k in system.independent]
     kept = np.ix_(
         [("Vx", "Vy", "Vz", "wx", "wy", "wz").index(row) for row in rows.split()],
         [names.index(column) for column in columns.split()],

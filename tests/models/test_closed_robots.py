@@ -31,7 +31,7 @@ def numbers(function, *arguments):
 
 
 def free_names(system):
-    return [system.speeds[k].name for k in system.free]
+    return [system.velocity_coordinates[k].name for k in system.chosen_coordinates]
 
 
 def active_positions(system, seed):
@@ -97,7 +97,7 @@ def test_jacobian_is_the_slope_of_the_pose_along_closed_configurations(systems, 
     spin = (ahead[:3, :3] @ behind[:3, :3].T - behind[:3, :3] @ ahead[:3, :3].T) / (4 * h)
     w = [spin[2, 1], spin[0, 2], spin[1, 0]]
     J = numbers(mbs.models.jacobian(system, TOOLS[name]), configuration(system, q_a))
-    assert J.shape == (6, len(system.active))
+    assert J.shape == (6, len(system.independent))
     np.testing.assert_allclose(J @ v_a, [*V, *w], atol=2e-7)
 
 
@@ -222,7 +222,9 @@ def test_wrist_in_line_is_singular(systems):
 @pytest.mark.parametrize("name", ["five_bar", "delta"])
 def test_rows_must_be_named_for_fewer_than_six_motors(systems, name):
     system = systems[name]
-    with pytest.raises(ModelError, match=rf"6 rows and {len(system.active)} columns; name as many"):
+    with pytest.raises(
+        ModelError, match=rf"6 rows and {len(system.independent)} columns; name as many"
+    ):
         mbs.models.jacobian_determinant(system, "tool")
 
 

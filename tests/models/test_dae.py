@@ -30,19 +30,21 @@ def state(system, seed=0):
     """A closed configuration beside the assembled one, velocities that keep it closed, efforts."""
     rng = np.random.default_rng(seed)
     if system.is_closed:
-        moved = {system.speeds[k].name: rng.uniform(-0.2, 0.2) for k in system.active}
+        moved = {
+            system.velocity_coordinates[k].name: rng.uniform(-0.2, 0.2) for k in system.independent
+        }
         names = [c.name for c in system.coordinates]
         there = {
             n: system.configuration[names.index(n)] + x for n, x in moved.items() if n in names
         }
         q = mbs.loops.solve(system, there)
-        v = np.array(reduction_matrix(system)(q)) @ rng.uniform(-1, 1, len(system.active))
+        v = np.array(reduction_matrix(system)(q)) @ rng.uniform(-1, 1, len(system.independent))
     else:
         q = np.array(system.configuration) + rng.uniform(-0.5, 0.5, system.nq)
         for part in quaternions(system):
             q[part] /= np.linalg.norm(q[part])
         v = rng.uniform(-1, 1, system.nv)
-    u = rng.uniform(-2, 2, sum(speed.actuated for speed in system.speeds))
+    u = rng.uniform(-2, 2, sum(speed.actuated for speed in system.velocity_coordinates))
     return q, v.ravel(), u
 
 
@@ -58,7 +60,7 @@ def reference(system, q, v, u):
     A = np.array(mbs.models.inertia_matrix(system, "tree")(q))
     H = numbers(mbs.models.bias(system, "tree")(q, v))
     tau = np.zeros(system.nv)
-    tau[[k for k, speed in enumerate(system.speeds) if speed.actuated]] = u
+    tau[[k for k, speed in enumerate(system.velocity_coordinates) if speed.actuated]] = u
     if not system.is_closed:
         return np.linalg.solve(A, tau - H)
     positions = closure_residual(system).numel_out(0)
@@ -99,7 +101,9 @@ def test_reduced_equations_give_the_same_motion(name):
     d = dae(system)
     q, v, u = state(system)
     a = reference(system, q, v, u)[: system.nv]
-    names = [c.name + ".q" for c in system.coordinates] + [s.name + ".v" for s in system.speeds]
+    names = [c.name + ".q" for c in system.coordinates] + [
+        s.name + ".v" for s in system.velocity_coordinates
+    ]
     values = dict(zip(names, [*q, *v], strict=True))
     rates = dict(zip(names, [*numbers(system.qdot(q, v)), *a], strict=True))
     x = [values[element] for element, _ in d.elements["x"]]

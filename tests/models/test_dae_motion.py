@@ -27,7 +27,7 @@ def simulated(system, duration, **start):
         options = dict(step=duration / 5, tolerance=1e-11, quiet=True)
         result = mbs.simulate.run(system, duration, **options, **start)
         q = [result[f"{c.name}.q"][1:] for c in system.coordinates]
-        v = [result[f"{s.name}.v"][1:] for s in system.speeds]
+        v = [result[f"{s.name}.v"][1:] for s in system.velocity_coordinates]
         SIMULATIONS[key] = np.array(q), np.array(v)
     return SIMULATIONS[key]
 

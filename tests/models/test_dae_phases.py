@@ -50,7 +50,7 @@ def at_start(d):
 
 
 def motors(system):
-    names = [speed.name for speed in system.speeds if speed.actuated]
+    names = [speed.name for speed in system.velocity_coordinates if speed.actuated]
     return dict(zip(names, np.linspace(-4, 6, len(names)), strict=True))
 
 

@@ -76,7 +76,7 @@ def test_slopes_by_states_and_inputs(joints, loop, method):
     )
     assert f.name_in()[-3:] == g.name_in()[-3:] == ["z", "u", "p"]
     rng = np.random.default_rng(1)
-    m = len(system.free)
+    m = len(system.chosen_coordinates)
     q = np.array(system.configuration) + (0 if loop else rng.uniform(-1, 1, system.nq))
     values = [q, rng.uniform(-1, 1, m), rng.uniform(-1, 1, m), [0.7], [0.4], [0.3]]
     for slopes, model in (

@@ -68,14 +68,18 @@ def test_accelerations_with_respect_to_parameters(method):
 @pytest.mark.parametrize("name", ["four_bar", "five_bar", "sr400"])
 def test_closed_systems_along_their_motion(name):
     system = catalogue_system(name)
-    m, rng = len(system.active), np.random.default_rng(0)
-    start = np.array(system.configuration)[list(system.active)]
+    m, rng = len(system.independent), np.random.default_rng(0)
+    start = np.array(system.configuration)[list(system.independent)]
     q = np.array(mbs.loops.solve(system, start + 0.1))
     v, a = rng.uniform(-1, 1, (2, m))
 
     def moved_by(e):
         active = dict(
-            zip([system.speeds[k].name for k in system.active], start + 0.1 + e, strict=True)
+            zip(
+                [system.velocity_coordinates[k].name for k in system.independent],
+                start + 0.1 + e,
+                strict=True,
+            )
         )
         return np.array(mbs.loops.solve(system, active, guess=names_of(system, q)))
 

@@ -172,7 +172,7 @@ def test_external_wrenches(method, name):
     system = catalogue_system(name)
     method = "composite" if system.is_closed else method
     rng = np.random.default_rng(3)
-    m = len(system.active)
+    m = len(system.independent)
     q = list(system.configuration)
     v, a = rng.uniform(-1, 1, (2, m))
     wrenches = rng.uniform(-1, 1, (6, len(system.bodies)))

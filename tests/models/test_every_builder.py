@@ -164,7 +164,7 @@ def test_closed_forms_differentiate_twice(name):
     """q(q_a) on a branch: first and second derivatives in an MX graph against differences."""
     system = CLOSED[name]()
     loops = mbs.loops.function(system)
-    q_a = np.array(system.configuration)[list(system.active)]
+    q_a = np.array(system.configuration)[list(system.independent)]
     q_a = q_a + np.linspace(0.1, 0.3, len(q_a))  # away from half a turn
     y = np.random.default_rng(0).uniform(-1, 1, system.nq)
     x = casadi.MX.sym("q_a", len(q_a))

@@ -75,6 +75,6 @@ def test_actuated_velocities_are_no_independent_ones():
     m.connect(b.right, mbs.components.Revolute("j3", actuated=False), c.right)
     m.connect(m.world.at(0.8), mbs.components.Revolute("j4", actuated=True), c.left)
     system = m.assemble(active=["j1"])
-    names = [speed.name for speed in system.speeds]
-    assert [names[k] for k in system.active] == ["j1"]
+    names = [speed.name for speed in system.velocity_coordinates]
+    assert [names[k] for k in system.independent] == ["j1"]
     assert [names[k] for k in system.actuated] == ["j4"]

@@ -15,7 +15,7 @@ from mbs.errors import ModelError
 def test_an_open_tree_needs_the_efforts_of_the_inverse_model(seed):
     system = random_tree(seed, n=6).mechanism.assemble()
     rng = np.random.default_rng(seed)
-    names = [speed.name for speed in system.speeds]
+    names = [speed.name for speed in system.velocity_coordinates]
     held = list(rng.choice(names, size=2, replace=False))
     numbers = [names.index(name) for name in held]
     q = np.array(system.configuration)
@@ -34,13 +34,13 @@ def test_an_open_tree_needs_the_efforts_of_the_inverse_model(seed):
 def test_a_closed_chain_moves_as_with_the_effort_that_was_found(closing):
     mechanism, guess = closed_chain(3, closing)
     system = mechanism.assemble(guess=guess)
-    name = system.speeds[system.active[0]].name
+    name = system.velocity_coordinates[system.independent[0]].name
     rng = np.random.default_rng(1)
     G = np.array(mbs.loops.reduction_matrix(system)(system.configuration))
-    v, tau = G @ rng.normal(size=len(system.active)), rng.normal(size=system.nv)
+    v, tau = G @ rng.normal(size=len(system.independent)), rng.normal(size=system.nv)
     hybrid = mbs.models.hybrid_dynamics(system, [name])
     a, added, lam = (np.array(x).ravel() for x in hybrid(system.configuration, v, tau, [1.7]))
-    k = system.active[0]
+    k = system.independent[0]
     assert a[k] == pytest.approx(1.7, abs=1e-9)
     tau[k] += added[0]
     direct = mbs.models.direct_dynamics(system, coordinates="tree")

@@ -130,7 +130,7 @@ def test_lagrange_of_a_closed_system(closing):
     mechanism, guess = closed_chain(3, closing)
     system = mechanism.assemble(guess=guess)
     rng = np.random.default_rng(0)
-    q, m = np.array(system.configuration), len(system.active)
+    q, m = np.array(system.configuration), len(system.independent)
     v_a, a_a = rng.uniform(-1, 1, (2, m))
     A, B, Q = (np.array(x) for x in mbs.models.lagrange(system)(q, v_a))
     tau = np.array(mbs.models.inverse_dynamics(system)(q, v_a, a_a)).ravel()

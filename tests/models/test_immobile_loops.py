@@ -191,9 +191,9 @@ def test_dae(name, form):
     v, tau = pair.tree(pair.v), pair.tree(pair.tau)
     a, lam = (numbers(x).ravel() for x in model(pair.q, v, tau))
     values = {f"{c.name}.q": x for c, x in zip(pair.bars.coordinates, pair.q, strict=True)}
-    values |= {f"{s.name}.v": x for s, x in zip(pair.bars.speeds, v, strict=True)}
+    values |= {f"{s.name}.v": x for s, x in zip(pair.bars.velocity_coordinates, v, strict=True)}
     rates = {f"{c.name}.q": x for c, x in zip(pair.bars.coordinates, v, strict=True)}
-    rates |= {f"{s.name}.v": x for s, x in zip(pair.bars.speeds, a, strict=True)}
+    rates |= {f"{s.name}.v": x for s, x in zip(pair.bars.velocity_coordinates, a, strict=True)}
     x = [values[key] for key, _ in d.elements["x"]]
     z = np.concatenate([a, lam, np.zeros(len(lam))])[: d.z.numel()] if form != "reduced" else []
     ode, alg, invariants, q_of, v_of = map(numbers, d.function()(x, z, pair.tau, d.p0))

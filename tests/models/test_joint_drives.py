@@ -143,8 +143,8 @@ def test_rotor_moves_as_a_body_behind_a_gear(kind, seed):
     every = dict(zip((c.name for c in driven.coordinates), q, strict=True))
     every["spin"] = RATIO * every["joint"]
     q_all = [every[c.name] for c in geared.coordinates]
-    names = [speed.name for speed in driven.speeds]
-    order = [names.index(geared.speeds[k].name) for k in geared.active]
+    names = [speed.name for speed in driven.velocity_coordinates]
+    order = [names.index(geared.velocity_coordinates[k].name) for k in geared.independent]
     assert sorted(order) == list(range(driven.nv))
     v_a, a_a = v[order], a[order]
     tau = numbers(MODELS.inverse_dynamics(driven)(q, v, a)).ravel()

@@ -46,7 +46,7 @@ def test_axes_carry_the_efforts(seed):
     q, v, a = random_state(system, np.random.default_rng(seed))
     F = joint_wrenches(system)(q, v, a)
     tau = np.array(IDM(system)(q, v, a)).ravel()
-    for number, speed in enumerate(system.speeds):
+    for number, speed in enumerate(system.velocity_coordinates):
         joint = m.components[speed.joint]
         own = float(str(joint.Ia)) * a[number] + float(str(joint.Fv)) * v[number]
         expected = tau[number] - own

@@ -107,17 +107,17 @@ def test_efforts_that_the_loops_distribute():
     mechanism, guess = closed_chain(1, "revolute")
     system = mechanism.assemble(guess=guess)
     rng = np.random.default_rng(2)
-    v_a, a_a = rng.uniform(-1, 1, (2, len(system.active)))
+    v_a, a_a = rng.uniform(-1, 1, (2, len(system.independent)))
     state = tree_state(system, v_a, a_a)
     tau = np.zeros(system.nv)
-    tau[list(system.active)] = np.array(IDM(system)(state.q, v_a, a_a)).ravel()
+    tau[list(system.independent)] = np.array(IDM(system)(state.q, v_a, a_a)).ravel()
     J = np.array(closure_jacobian(system)(state.q))[list(system.closure.rows)]
     other = tau + J.T @ rng.uniform(-9, 9, len(J))
     model = joint_wrenches(system, "tree")
     F, G = (np.array(model(state.q, state.v, state.a, t)) for t in (tau, other))
     assert np.abs(F - G).max() > 1
     balanced(mechanism, system, state, G)
-    for number, speed in enumerate(system.speeds):
+    for number, speed in enumerate(system.velocity_coordinates):
         joint = mechanism.components[speed.joint]
         own = float(str(joint.Ia)) * state.a[number] + float(str(joint.Fv)) * state.v[number]
         axis = along(joint, speed.name, state.q, system)

@@ -137,7 +137,7 @@ def test_jacobian_dot_velocity_is_the_derivative_of_the_jacobian(seed, axes):
 def test_closed_system_in_independent_coordinates(closing):
     mechanism, guess = closed_chain(3, closing)
     system = mechanism.assemble(guess=guess)
-    q, m = np.array(system.configuration), len(system.active)
+    q, m = np.array(system.configuration), len(system.independent)
     v_a, a_a = np.random.default_rng(0).uniform(-1, 1, (2, m))
     G = np.array(mbs.loops.reduction_matrix(system)(q))
     name = system.bodies[-2].name

@@ -175,7 +175,7 @@ def test_any_part_of_a_random_tree(seed, size, aligned):
 def test_part_of_a_closed_system():
     mechanism, guess = closed_chain(3, "universal")
     system = mechanism.assemble(guess=guess)
-    q, m = np.array(system.configuration), len(system.active)
+    q, m = np.array(system.configuration), len(system.independent)
     name, rows = system.bodies[3].name, [1, 3, 5, 0][:m]
     J = np.array(jacobian(system, name)(q))[rows]
     det = float(jacobian_determinant(system, name, rows)(q))

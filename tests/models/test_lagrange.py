@@ -61,7 +61,7 @@ def test_closed_system():
     mechanism, guess = closed_chain(3, "revolute")
     system = mechanism.assemble(guess=guess)
     rng = np.random.default_rng(2)
-    v = rng.uniform(-1, 1, len(system.active))
+    v = rng.uniform(-1, 1, len(system.independent))
     same(*both(system, list(system.configuration), v))
     v = rng.uniform(-1, 1, system.nv)
     same(*both(system, list(system.configuration), v, coordinates="tree"))

@@ -89,8 +89,8 @@ def driven_arm():
     m.connect(gear.flange_b, j1.flange)
     control = m.add(Integral("control", gain=20.0))
     m.add(JointSensor("encoder", "j1"))
-    m.wire("encoder.q", control.measured)
-    m.wire(control.u, motor.voltage)
+    m.connect_signal("encoder.q", control.measured)
+    m.connect_signal(control.u, motor.voltage)
     return m.assemble()
 
 
@@ -99,13 +99,17 @@ def test_slopes_are_those_of_the_equations_of_motion(name):
     """A and B are the Jacobians of the explicit equations, whose states are the same."""
     system = driven_arm() if name == "driven_arm" else mbs.load(name).assemble()
     rng = np.random.default_rng(3)
-    free = [system.speeds[k].name for k in system.free]
+    free = [system.velocity_coordinates[k].name for k in system.chosen_coordinates]
     q0 = dict(zip(free, system.configuration + 0.2 * rng.uniform(size=system.nq), strict=False))
     q0 = {
         n: system.configuration[[c.name for c in system.coordinates].index(n)] + 0.1 for n in free
     }
     v0 = dict(zip(free, rng.uniform(-1, 1, len(free)), strict=True))
-    tau0 = {s.name: 1.3 for k, s in enumerate(system.speeds) if s.actuated and s.name != "j1"}
+    tau0 = {
+        s.name: 1.3
+        for k, s in enumerate(system.velocity_coordinates)
+        if s.actuated and s.name != "j1"
+    }
     model = linearise(system).at(q0=q0, v0=v0, tau0=tau0)
     d = dae(system, q0=q0, v0=v0, tau0=tau0)
     assert [n for n, _ in d.elements["x"]] == [n for n, _ in model.x]

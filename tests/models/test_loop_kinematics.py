@@ -47,7 +47,7 @@ def along(system, v, h):
 
 def motion(system, seed=3):
     """Independent velocities and those of the tree that follow, at the assembled configuration."""
-    v_a = np.random.default_rng(seed).uniform(-1, 1, len(system.active))
+    v_a = np.random.default_rng(seed).uniform(-1, 1, len(system.independent))
     return v_a, np.array(reduction_matrix(system)(list(system.configuration))) @ v_a
 
 
@@ -96,7 +96,7 @@ def test_the_rows_are_those_of_the_closure(system):
     q, closure = list(system.configuration), system.closure
     M = matrices(system, q)
     J = np.array(closure_jacobian(system)(q))[list(closure.rows)]
-    np.testing.assert_allclose(M["Wa"], J[:, list(closure.active)], atol=1e-14)
+    np.testing.assert_allclose(M["Wa"], J[:, list(closure.independent)], atol=1e-14)
     np.testing.assert_allclose(M["Wp"], J[:, list(closure.passive)], atol=1e-14)
     assert np.abs(M["Wa"] + M["Wp"] @ M["W"]).max() < 1e-11
     np.testing.assert_allclose(M["G"], np.array(reduction_matrix(system)(q)), atol=1e-12)
@@ -178,11 +178,13 @@ def test_a_joint_has_one_velocity_wherever_the_loop_is_cut():
 
     in_tree = assembled("closing")
     _, v = motion(in_tree)
-    names = [speed.name for speed in in_tree.speeds]
+    names = [speed.name for speed in in_tree.velocity_coordinates]
     known = dict(zip(names, v, strict=True))
     elsewhere = assembled("j2")
     M = matrices(elsewhere, list(elsewhere.configuration))
-    active = np.array([known.get(elsewhere.speeds[k].name, np.nan) for k in elsewhere.active])
+    active = np.array(
+        [known.get(elsewhere.velocity_coordinates[k].name, np.nan) for k in elsewhere.independent]
+    )
     assert not np.isnan(active).any()
     v_c = (M["Wac"] + M["Wpc"] @ M["W"]) @ active
     np.testing.assert_allclose(v_c, [known["j2"]], atol=1e-9)

@@ -233,7 +233,7 @@ def test_coordinates_of_cut_joints(kind):
         mechanism.add(JointSensor(f"s{number}", name))
     system = mechanism.assemble(guess=guess)
     rng = np.random.default_rng(1)
-    state = tree_state(system, *rng.uniform(-1, 1, (2, len(system.active))))
+    state = tree_state(system, *rng.uniform(-1, 1, (2, len(system.independent))))
     now = read(system, state)
     ends = [read(system, after(system, state, h)) for h in (STEP, -STEP)]
     for k in range(len(names)):

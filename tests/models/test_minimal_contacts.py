@@ -35,7 +35,7 @@ def compared(system, duration, q0=None, v0=None, tau=None, motion=None):
     state, times = minimal_state(system, drive=drive), np.linspace(0, duration, 41)
 
     def inputs(t):
-        values = [(tau or {}).get(system.speeds[k].name, 0) for k in state.inputs]
+        values = [(tau or {}).get(system.velocity_coordinates[k].name, 0) for k in state.inputs]
         for name, law in (motion or {}).items():
             rates = [law(t)]
             for _ in range(2 if name[-1] == "q" else 0):

@@ -122,7 +122,7 @@ def test_wrench_motions_law_and_contacts_together_move_an_arm_as_in_a_simulation
     for column, number in enumerate(state.positions):
         name = f"{system.coordinates[number].name}.q"
         np.testing.assert_allclose(own.x[:, column], full[name], atol=1e-8)
-    names = [f"{system.speeds[k].name}.tau" for k in state.efforts]
+    names = [f"{system.velocity_coordinates[k].name}.tau" for k in state.efforts]
     names += [effort.name for effort in state.contacts]
     for column, name in zip(own.y[:, -len(names) :].T, names, strict=True):
         np.testing.assert_allclose(column, full[name], atol=1e-6)

@@ -91,7 +91,7 @@ def test_a_wrench_on_a_frame_is_the_opposite_of_f_ext(name):
     efforts[list(state.inputs)] = tau
     v = x[len(state.positions) :]
     expected = direct_dynamics(system, f_ext=True)(
-        q, v, efforts[list(system.active)], on_body(system, q, frame, wrench)
+        q, v, efforts[list(system.independent)], on_body(system, q, frame, wrench)
     )
     a = np.array(xdot)[len(state.positions) :]
     free, _ = state.rhs(0.0, x, z, [*tau, *np.zeros(6)], system.p_default)
@@ -171,8 +171,8 @@ def test_a_prescribed_acceleration_of_a_loop_is_that_of_hybrid_dynamics():
 def test_the_acceleration_that_a_loop_has_anyway_needs_no_drive(name):
     """One of them has rows whose independence changes with the configuration."""
     system = catalogue_system(name)
-    first = system.active[0]
-    motion = ((system.speeds[first].name, "a"),)
+    first = system.independent[0]
+    motion = ((system.velocity_coordinates[first].name, "a"),)
     free, driven = (minimal_state(system, drive=DriveInputs(motions=m)) for m in ((), motion))
     x, z, _ = random_point(system, free)
     efforts = {k: 0.5 for k in free.inputs if k != first}

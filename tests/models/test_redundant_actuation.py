@@ -65,7 +65,7 @@ GUESS = {"left": 1.9, "elbow": -1.2, "right": 1.2, "other": 0.9}
 
 
 def names(system, numbers):
-    return [system.speeds[k].name for k in numbers]
+    return [system.velocity_coordinates[k].name for k in numbers]
 
 
 def configuration(system):
@@ -75,7 +75,7 @@ def configuration(system):
 def closed(system, count=5):
     """Configurations near the assembled one, and independent velocities and accelerations."""
     rng = np.random.default_rng(7)
-    start = np.array(system.configuration)[list(system.active)]
+    start = np.array(system.configuration)[list(system.independent)]
     for _ in range(count):
         q_a = start + rng.uniform(-0.1, 0.1, len(start))
         q = np.array(mbs.loops.solve(system, q_a, guess=configuration(system))).ravel()
@@ -85,10 +85,10 @@ def closed(system, count=5):
 def test_what_was_assembled_is_told(redundant):
     assert redundant.closure.mobility == 2
     assert set(names(redundant, redundant.motors)) == {"left", "right", "elbow"}
-    assert set(redundant.active) < set(redundant.motors)
+    assert set(redundant.independent) < set(redundant.motors)
     assert "Driven by 3 efforts: " in redundant.report()
     alone = five_bar(("left", "right")).assemble(guess=GUESS)
-    assert alone.motors == alone.active
+    assert alone.motors == alone.independent
     assert "Driven by" not in alone.report()
 
 
@@ -110,9 +110,9 @@ def test_inverse_and_direct_dynamics_undo_each_other(redundant):
 
 
 def test_all_motors_do_what_equal_efforts_of_independent_joints_do(redundant):
-    active = names(redundant, redundant.active)
+    active = names(redundant, redundant.independent)
     alone = five_bar(tuple(active)).assemble(guess=configuration(redundant), active=active)
-    assert alone.active == redundant.active == alone.motors
+    assert alone.independent == redundant.independent == alone.motors
     ddm, reference = mbs.models.direct_dynamics(redundant), mbs.models.direct_dynamics(alone)
     tree = mbs.models.direct_dynamics(redundant, coordinates="tree")
     matrix, G = mbs.models.actuation_matrix(redundant), mbs.loops.reduction_matrix(redundant)
@@ -123,7 +123,7 @@ def test_all_motors_do_what_equal_efforts_of_independent_joints_do(redundant):
         tau = np.zeros(redundant.nv)
         tau[list(redundant.motors)] = tau_m
         every = np.array(tree(q, G(q) @ v, tau)[0]).ravel()
-        np.testing.assert_allclose(every[list(redundant.active)], a, atol=1e-9)
+        np.testing.assert_allclose(every[list(redundant.independent)], a, atol=1e-9)
 
 
 def pushed(system):
@@ -150,13 +150,13 @@ def test_the_power_of_all_motors_is_the_rate_of_the_energy(redundant):
     assert np.ptp(energy) > 1
     np.testing.assert_allclose(energy - energy[0], work, atol=1e-4 * np.ptp(energy))
     matrix = mbs.models.actuation_matrix(redundant)
-    active = names(redundant, redundant.active)
+    active = names(redundant, redundant.independent)
     alone = five_bar(tuple(active)).assemble(guess=configuration(redundant), active=active)
 
     def equal(t, q, v):
         tau = casadi.vertcat(*pushed(redundant)(t, q, v))
         values = casadi.SX.zeros(alone.nv)
-        values[list(alone.active)] = matrix(q) @ tau[list(redundant.motors)]
+        values[list(alone.independent)] = matrix(q) @ tau[list(redundant.motors)]
         return values
 
     same = mbs.simulate.run(alone, 1.0, tau=equal, step=1e-3, **QUIET)
@@ -189,7 +189,7 @@ def test_the_other_models_are_of_the_independent_joints(redundant):
             np.testing.assert_allclose(np.array(found), np.array(same), atol=1e-8)
         np.testing.assert_allclose(np.array(slopes(q, v, tau_a)[-1]).ravel(), a, atol=1e-9)
         tau_m = rng.normal(size=3)
-        x = np.concatenate([q[list(redundant.active)], v])
+        x = np.concatenate([q[list(redundant.independent)], v])
         rate = np.array(ode(x, tau_m)).ravel()[-2:]
         np.testing.assert_allclose(rate, np.array(ddm(q, v, tau_m)).ravel(), atol=1e-8)
 
@@ -209,7 +209,7 @@ def test_gas_forces_on_all_pistons_of_a_crankshaft():
         assert system.closure.mobility == 1
         assert names(system, system.motors) == ["gas0", "gas1", "gas2"]
         assert mbs.models.actuation_null_space(system)(system.configuration).shape == (3, 2)
-    assert names(system, system.active) == ["crank_angle"]
+    assert names(system, system.independent) == ["crank_angle"]
     forces = {"gas0": -400.0, "gas1": -150.0, "gas2": 30.0}
     result = mbs.simulate.run(system, 0.2, tau=forces, step=1e-3, v0={"crank_angle": 30}, **QUIET)
     energy = result["kinetic_energy"] + result["potential_energy"]
@@ -226,7 +226,7 @@ def test_gas_forces_on_all_pistons_of_a_crankshaft():
 def test_velocities_that_are_named_beyond_the_mobility_are_driven():
     system = mbs.robots.n_four_bar(1).assemble(active=["a0", "a1"])
     assert names(system, system.motors) == ["a0", "a1"]
-    assert [s.name for s in system.speeds if s.actuated] == ["a0", "a1"]
+    assert [s.name for s in system.velocity_coordinates if s.actuated] == ["a0", "a1"]
     result = mbs.simulate.run(system, 0.1, tau={"a0": 1.0, "a1": 2.0}, quiet=True)
     assert result["a1.tau"][0] == 2.0
 
@@ -234,16 +234,16 @@ def test_velocities_that_are_named_beyond_the_mobility_are_driven():
 def test_another_independent_joint_than_the_motor_leaves_the_motor_alone():
     m = five_bar(("left", "right"))
     system = m.assemble(guess=GUESS, active=["left", "elbow"])
-    assert names(system, system.active) == ["left", "elbow"]
+    assert names(system, system.independent) == ["left", "elbow"]
     assert names(system, system.motors) == ["left", "right"]
     usual = m.assemble(guess=GUESS)
     ddm, tree = (mbs.models.direct_dynamics(usual, coordinates=c) for c in ("independent", "tree"))
-    rows = list(system.active)
+    rows = list(system.independent)
     for q, v, a, _ in closed(usual, 2):
         G = mbs.loops.reduction_matrix(usual)(q)
         tau, every = mbs.models.inverse_dynamics(usual)(q, v, a), np.zeros(usual.nv)
         assert np.array(ddm(q, v, tau)).ravel() == pytest.approx(a)
-        every[list(usual.active)] = np.array(tau).ravel()
+        every[list(usual.independent)] = np.array(tau).ravel()
         found = np.array(tree(q, G @ v, every)[0]).ravel()[rows]
         same = mbs.models.inverse_dynamics(system)(q, np.array(G @ v).ravel()[rows], found)
         np.testing.assert_allclose(np.array(same), np.array(tau), atol=1e-8)

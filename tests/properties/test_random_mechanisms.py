@@ -88,7 +88,7 @@ def test_closed_mechanism_assembles_and_its_models_agree(drawn):
     q = np.array(system.configuration)
     assert np.abs(np.array(closure_residual(system)(q))).max() < 1e-12
     rng = np.random.default_rng(0)
-    v_a, a_a = rng.uniform(-1, 1, (2, len(system.active)))
+    v_a, a_a = rng.uniform(-1, 1, (2, len(system.independent)))
     tau = mbs.models.inverse_dynamics(system)(q, v_a, a_a)
     A = np.array(mbs.models.inertia_matrix(system)(q))
     back = np.array(mbs.models.direct_dynamics(system)(q, v_a, tau)).ravel()
@@ -121,7 +121,7 @@ def dissipated(system, result):
     )
     power = sum(
         float(link.Fv) * fine[f"{speed.name}.v"] ** 2
-        for link, speed in zip(system.tree.links, system.speeds, strict=True)
+        for link, speed in zip(system.tree.links, system.velocity_coordinates, strict=True)
     )
     return float(np.trapezoid(power, fine.time))
 

@@ -71,7 +71,7 @@ def test_the_ends_of_a_ring_coincide():
     system = catalogue_system("four_bar")
     q = SX.sym("q", extent(system))
     ring = ring_of(system, 0, (), q)
-    found = mbs.loops.solve(system, {system.coordinates[system.active[0]].name: 0.4})
+    found = mbs.loops.solve(system, {system.coordinates[system.independent[0]].name: 0.4})
     angle = {joint.name: joint.index for joint in ring.joints}
     x = [float(found[angle[joint.name]]) for joint in ring.joints if not joint.cut]
     assert len(ring.gaps) == len(ring.joints) == len(x) + 1

@@ -44,10 +44,10 @@ def test_a_free_base_is_that_of_pinocchio(file):
         *(f"root_joint.{k}" for k in ("x", "y", "z", "qw", "qx", "qy", "qz")),
         *("hip", "knee"),
     ]
-    assert [s.name for s in system.speeds[:6]] == [
+    assert [s.name for s in system.velocity_coordinates[:6]] == [
         f"root_joint.{k}" for k in ("vx", "vy", "vz", "wx", "wy", "wz")
     ]
-    assert [s.actuated for s in system.speeds] == [False] * 6 + [True] * 2
+    assert [s.actuated for s in system.velocity_coordinates] == [False] * 6 + [True] * 2
     model = pinocchio.buildModelFromUrdf(str(path), pinocchio.JointModelFreeFlyer())
     rng = np.random.default_rng(0)
     q, v, a = rng.uniform(-1, 1, 9), *rng.uniform(-1, 1, (2, 8))

@@ -30,7 +30,7 @@ def test_energy_of_a_fall(robot, seconds):
 @pytest.mark.parametrize("ratio", [1.0, 1.5])
 def test_differential_wrist_pitches_by_the_sum_and_rolls_by_the_difference(ratio):
     system = differential_wrist(ratio).assemble()
-    assert [system.speeds[k].name for k in system.active] == ["q1", "q2"]
+    assert [system.velocity_coordinates[k].name for k in system.independent] == ["q1", "q2"]
     q = mbs.loops.solve(system, {"q1": 0.9, "q2": -0.3})
     at = named(system, q)
     pitch, roll = 0.3, ratio * 0.6

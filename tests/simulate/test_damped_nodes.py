@@ -56,7 +56,7 @@ def exact(time, parallel=0.0, damping=C):
 @pytest.mark.parametrize("options", [{}, {"method": "rodas"}], ids=["dopri", "rodas"])
 def test_a_spring_and_a_damper_in_series(parallel, options):
     system = element(parallel=parallel).assemble(guess={"x": 1.0})
-    assert [system.speeds[k].name for k in system.active] == ["x"]
+    assert [system.velocity_coordinates[k].name for k in system.independent] == ["x"]
     assert "The balance of forces gives the velocities of n" in system.report()
     result = mbs.simulate.run(system, 1.0, q0={"x": 1.1}, tolerance=1e-10, **options)
     x, n = exact(result.time, parallel)
@@ -140,7 +140,7 @@ def test_two_nodes_in_a_chain():
     m.add(Damper("d", one.at(), two.at(0.5), damping=C))
     m.add(Spring("s2", two.at(), body.at(), stiffness=K, length=1.0))
     system = m.assemble(guess={"n2": 0.5, "x": 1.5})
-    assert [system.speeds[k].name for k in system.active] == ["x"]
+    assert [system.velocity_coordinates[k].name for k in system.independent] == ["x"]
     result = mbs.simulate.run(system, 1.0, q0={"x": 1.6}, tolerance=1e-10)
     np.testing.assert_allclose(400 * result["n1.q"], K * (result["x.q"] - result["n2.q"] - 1))
     opened = result["n2.q"] - result["n1.q"] - 0.5
@@ -227,7 +227,7 @@ def test_a_node_is_as_one_of_little_mass(name):
     small = build(1e-6 if name == "rotation" else 1e-5).assemble()
     q0, v0 = (
         {row.name: float(result[f"{row.name}.{kind}"][0]) for row in rows}
-        for rows, kind in ((system.coordinates, "q"), (system.speeds, "v"))
+        for rows, kind in ((system.coordinates, "q"), (system.velocity_coordinates, "v"))
     )
     options = {"q0": q0, "v0": v0, "tolerance": 1e-6, "method": "rodas"}
     other = mbs.simulate.run(small, 0.5, **options)
@@ -255,7 +255,7 @@ def test_slopes_of_a_moving_node():
     ddm = mbs.models.direct_dynamics(system)
     s = casadi.SX.sym("q", 3)
     slope = casadi.Function("slope", [s], [casadi.jacobian(ddm(s, [1.0, 0.2], [0, 0]), s)])
-    order = [names.index(system.speeds[k].name) for k in system.free]
+    order = [names.index(system.velocity_coordinates[k].name) for k in system.chosen_coordinates]
     np.testing.assert_allclose(A[3:, :3], slope(q).full()[:, order], atol=1e-9)
 
 

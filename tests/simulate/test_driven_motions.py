@@ -50,7 +50,7 @@ def test_elastic_transmission_has_its_frequency():
 def test_energy_of_driven_trees_is_kept(seed):
     system = driven_tree(seed).assemble()
     rng = np.random.default_rng(seed)
-    v0 = {speed.name: rng.uniform(-1, 1) for speed in system.speeds}
+    v0 = {speed.name: rng.uniform(-1, 1) for speed in system.velocity_coordinates}
     result = mbs.simulate.run(system, 1.0, v0=v0, tolerance=1e-11)
     total = result["kinetic_energy"] + result["potential_energy"]
     assert np.ptp(total) < 1e-7 * result["kinetic_energy"].max()

@@ -47,7 +47,7 @@ def test_many_windows_keep_two_rows_each():
     system = n_four_bar(55).assemble()
     closure = system.closure
     assert closure.rows == tuple(k for k in range(5 * 55) if k % 5 < 2)
-    assert closure.active == (0,)
+    assert closure.independent == (0,)
     assert not closure.varies
     assert closure.residual < 1e-12
     q = mbs.loops.solve(system, {"a0": 2.0})

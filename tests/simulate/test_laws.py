@@ -444,7 +444,7 @@ def test_control_c_in_a_law_stops_the_run_at_once():
 def test_laws_of_closed_systems_have_the_efforts_of_their_models():
     """Two motors of a five-bar, as numbers, a law, and a Function of the independent velocities."""
     system = mbs.load("five_bar").assemble()
-    names = [system.speeds[k].name for k in system.motors]
+    names = [system.velocity_coordinates[k].name for k in system.motors]
     assert (system.nv, len(names)) == (4, 2)
     options = {"quiet": True, "step": 0.1, "q0": dict.fromkeys(names, 0.2)}
     by_name = mbs.simulate.run(
@@ -462,7 +462,7 @@ def test_laws_of_closed_systems_have_the_efforts_of_their_models():
     damped = mbs.simulate.run(
         system, 0.3, tau=casadi.Function("law", [t, q, v], [-0.05 * v]), **options
     )
-    index = [system.speeds[k].name for k in system.active]
+    index = [system.velocity_coordinates[k].name for k in system.independent]
     for name in index:
         np.testing.assert_allclose(damped[f"{name}.tau"], -0.05 * damped[f"{name}.v"], atol=1e-12)
     with pytest.raises(ModelError, match=r"tau has 3 values, the system has 4: .*, the models 2: "):
@@ -483,7 +483,7 @@ SCALARS = [
 def test_one_effort_for_several_joints_is_refused(name, law):
     """Also if only one of the joints of an open system has a motor."""
     system = mbs.load(name).assemble()
-    names = ", ".join(speed.name for speed in system.speeds)
+    names = ", ".join(speed.name for speed in system.velocity_coordinates)
     message = f"{name}: tau has 1 values, the system has {system.nv}: {names}"
     for call in (
         lambda: mbs.simulate.run(system, 0.1, tau=law, quiet=True),

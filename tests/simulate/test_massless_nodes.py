@@ -51,7 +51,7 @@ def assembled(*elements, **given):
 
 def test_springs_in_series_oscillate_as_one_spring():
     system = assembled()
-    assert [system.speeds[k].name for k in system.active] == ["x"]
+    assert [system.velocity_coordinates[k].name for k in system.independent] == ["x"]
     assert "The balance of forces gives n, which move no mass" in system.report()
     result = mbs.simulate.run(system, 2.0, q0={"x": 1.1}, tolerance=1e-10)
     exact = 0.1 * np.cos(np.sqrt(SERIES / MASS) * result.time)
@@ -269,7 +269,9 @@ def test_moments_of_inertia_do_not_resist_displacements(turns):
     """A node on a slide has no inertia along it; the angle behind it keeps its own."""
     joints = [Prismatic("n", axis="x"), *([Revolute("r", axis="x")] if turns else [])]
     system = with_inertia(*joints)
-    assert [system.speeds[k].name for k in system.active] == ["r", "x"][not turns :]
+    assert [system.velocity_coordinates[k].name for k in system.independent] == ["r", "x"][
+        not turns :
+    ]
     v0 = {"r": 0.5} if turns else None
     result = mbs.simulate.run(system, 1.0, q0={"x": 1.1}, v0=v0, tolerance=1e-10)
     exact = 0.1 * np.cos(np.sqrt(SERIES / MASS) * result.time)
@@ -309,7 +311,7 @@ def damper(m, left, knot):
 @pytest.mark.parametrize("method", ["dopri5", "rodas"])
 def test_a_node_of_a_structure_rests_where_its_springs_balance(method):
     system = structure(*BETWEEN)
-    assert system.closure.active == ()
+    assert system.closure.independent == ()
     result = mbs.simulate.run(system, 0.1, method=method, tolerance=1e-9)
     n = result["n.q"]
     assert np.ptp(n) < 1e-12
@@ -331,7 +333,7 @@ def test_a_node_of_a_structure_rests_where_its_springs_balance(method):
 def test_a_damped_node_of_a_structure_creeps():
     """Nothing else moves: the rate is that of the spring over the damping."""
     system = structure(BETWEEN[0], damper)
-    assert system.closure.active == ()
+    assert system.closure.independent == ()
     for method in ("dopri5", "rodas"):
         result = mbs.simulate.run(system, 1.0, q0={"n": 0.3}, method=method, tolerance=1e-9)
         exact = -0.2 + 0.5 * np.exp(-15 * result.time)

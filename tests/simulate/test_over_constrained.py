@@ -87,7 +87,7 @@ def test_wrenches_stay_of_one_size_all_the_way_round():
         v = np.array(G(mode.q)) @ [1.0]
         a = np.array(rates(mode.q, [1.0])[2]).ravel()
         tau = np.zeros(system.nv)
-        tau[list(system.active)] = float(idm(mode.q, [1.0], [0.0]))
+        tau[list(system.independent)] = float(idm(mode.q, [1.0], [0.0]))
         F, same = np.array(free(mode.q, [1.0], [0.0])), np.array(tree(mode.q, v, a, tau))
         assert same == pytest.approx(F, rel=1e-6, abs=1e-6)
         largest.append(np.abs(F).max())
@@ -97,7 +97,7 @@ def test_wrenches_stay_of_one_size_all_the_way_round():
 def test_a_motion_that_is_prescribed_goes_all_the_way_round():
     """The law goes on where one leg ends and the next begins."""
     system = bennett(1, 3, (0.9, 1.7))
-    start = assembly_modes(system, [0.5])[0].q[system.active[0]]
+    start = assembly_modes(system, [0.5])[0].q[system.independent[0]]
     result = mbs.simulate.run(
         system, 2.5, motion={"j1.q": lambda t: start + 3 * t}, tolerance=1e-9, quiet=True
     )

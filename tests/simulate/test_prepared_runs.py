@@ -78,7 +78,7 @@ def made(monkeypatch):
 
 def test_equations_are_kept_by_what_drives_them(made):
     system = mbs.load("planar_2r").assemble()
-    motor = system.speeds[0].name
+    motor = system.velocity_coordinates[0].name
     taus = (None, {motor: 1.0}, {motor: 1.0}, {motor: 2.0}, None)
     ends = [swing(system, tau=tau)[f"{motor}.q"][-1] for tau in taus]
     assert len(made) == 3
@@ -88,7 +88,7 @@ def test_equations_are_kept_by_what_drives_them(made):
 
 def test_few_equations_are_kept(made):
     system = mbs.load("planar_2r").assemble()
-    motor = system.speeds[0].name
+    motor = system.velocity_coordinates[0].name
     for tau in (*range(9), 8, 1, 0):
         swing(system, tau={motor: float(tau)})
     assert len(made) == 10  # the first one was forgotten, no other
@@ -187,7 +187,7 @@ def test_damaged_equations_are_derived_anew(damage, made, disk):
 
 def test_laws_of_time_are_told_apart():
     system = mbs.load("planar_2r").assemble()
-    motor = system.speeds[0].name
+    motor = system.velocity_coordinates[0].name
     ends = [
         swing(system, tau=lambda t, q, v, k=k: {motor: k * t})[f"{motor}.q"][-1]
         for k in (1.0, 3.0, 1.0)
@@ -197,7 +197,7 @@ def test_laws_of_time_are_told_apart():
 
 def test_laws_of_prescribed_motions_are_told_apart(made):
     system = mbs.load("planar_2r").assemble()
-    name = system.speeds[0].name
+    name = system.velocity_coordinates[0].name
     ends = [
         swing(system, motion={f"{name}.q": lambda t, k=k: k * t})[f"{name}.q"][-1]
         for k in (0.2, 0.6, 0.2)
@@ -214,7 +214,7 @@ def test_contacts_and_events_of_components_run_again_alike():
     m.add(SpherePlaneContact("ground", ball, m.world, radius=0.1, stiffness=1e5))
     hold = m.add(SampleHold("hold", 0.05))
     m.add(JointSensor("height", "z"))
-    m.wire("height.q", hold.u)
+    m.connect_signal("height.q", hold.u)
     system = m.assemble()
     first, again = (swing(system, q0={"z": 0.6}) for _ in range(2))
     assert np.array_equal(first.values, again.values)
@@ -307,7 +307,7 @@ def test_motions_that_differ_in_velocities_close_the_loops_once(monkeypatch):
     count = lambda *a: closed.append(a) or close(*a)  # noqa: E731
     monkeypatch.setattr(simulator, "start_position", count)
     system, other = (mbs.load("four_bar").assemble() for _ in range(2))
-    name = system.speeds[system.active[0]].name
+    name = system.velocity_coordinates[system.independent[0]].name
     starts = [dict(v0={name: 1.0}), dict(v0={name: 2.0}), dict(q0={name: 0.3}, v0={name: 2.0})]
     found = [swing(system, **one) for one in starts]
     assert len(closed) == 2

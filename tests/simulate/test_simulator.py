@@ -106,7 +106,7 @@ def test_modes_and_events_of_contacts():
 
 def test_over_constrained_loops_whose_rows_change_take_inputs():
     system = bennett()
-    (name,) = (system.speeds[k].name for k in system.active)
+    (name,) = (system.velocity_coordinates[k].name for k in system.independent)
     found = Simulator(system, inputs=[f"{name}.tau"])(1.0, inputs={f"{name}.tau": 0.8})
     wanted = run(system, 1.0, tau={name: 0.8}, quiet=True)
     assert np.abs(found.values - wanted.values).max() < 1e-7

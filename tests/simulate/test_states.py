@@ -17,7 +17,11 @@ TOLERANCE = 1e-8
 
 
 def first_speed(system):
-    return {system.speeds[system.active[0]].name: 0.7} if system.active else None
+    return (
+        {system.velocity_coordinates[system.independent[0]].name: 0.7}
+        if system.independent
+        else None
+    )
 
 
 def pieces(system, count, duration, v0, **more):
@@ -37,7 +41,7 @@ def at_once(system, duration, v0, **more):
 
 def require_same_end(parts, whole, system, atol):
     assert parts.time[-1] == pytest.approx(whole.time[-1], rel=1e-12)
-    for end, rows in (("q", system.coordinates), ("v", system.speeds)):
+    for end, rows in (("q", system.coordinates), ("v", system.velocity_coordinates)):
         for row in rows:
             name = f"{row.name}.{end}"
             expected = whole[name][-1]
@@ -82,7 +86,7 @@ def test_every_state_of_a_motion_is_a_start_by_name_as_list_and_as_state(name):
     for row in rows_of(result, 11):
         state = result.state(result.time[row])
         q = [state.q[c.name] for c in system.coordinates]
-        v = [state.v[s.name] for s in system.speeds]
+        v = [state.v[s.name] for s in system.velocity_coordinates]
         for q0, v0 in ((dict(state.q), dict(state.v)), (q, v), (state, None)):
             again = mbs.simulate.run(system, 0.01, q0=q0, v0=v0, quiet=True)
             found = [again[f"{c.name}.q"][0] for c in system.coordinates]
@@ -94,7 +98,7 @@ def test_every_state_of_a_motion_is_a_start_by_name_as_list_and_as_state(name):
 def test_a_guess_chooses_the_branch_of_a_start():
     system = catalogue_system("five_bar")
     result = at_once(system, 2.0, first_speed(system))
-    independent = [system.speeds[k].name for k in system.active]
+    independent = [system.velocity_coordinates[k].name for k in system.independent]
     for row in rows_of(result, 11):
         state = result.state(result.time[row])
         q0 = {name: state.q[name] for name in independent}
@@ -110,7 +114,7 @@ def test_positions_beside_the_independent_ones_are_checked():
     system = catalogue_system("four_bar")
     state = at_once(system, 1.0, first_speed(system)).state()
     names = list(state.q)
-    independent = [system.speeds[k].name for k in system.active]
+    independent = [system.velocity_coordinates[k].name for k in system.independent]
     other = next(name for name in names if name not in independent)
     known = {name: state.q[name] for name in (*independent, other)}
     again = mbs.simulate.run(system, 0.01, q0=known, quiet=True)
@@ -142,7 +146,7 @@ def test_an_fmu_starts_from_a_state(tmp_path_factory, fmi, kind):
     state = whole.state(whole.time[20])
     options = {"step": 0.025, "kind": kind, "tolerance": 1e-9, "quiet": True}
     moved = mbs.simulate.fmu(path, 0.5, start=state, **options)
-    name = system.speeds[system.active[0]].name
+    name = system.velocity_coordinates[system.independent[0]].name
     np.testing.assert_allclose(moved[f"{name}.q"], whole[f"{name}.q"][20:], atol=1e-6)
 
 

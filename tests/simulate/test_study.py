@@ -32,7 +32,7 @@ def test_functions_are_told_by_name_and_objects_without_their_address(system):
 
 
 def test_laws_are_told_by_what_they_say(system):
-    name = system.speeds[0].name
+    name = system.velocity_coordinates[0].name
 
     def study(factor):
         def torque(t, q, v):

@@ -73,7 +73,13 @@ def noisy(monkeypatch):
 def chosen(system):
     """What the analysis of the loops decides."""
     closure = system.closure
-    return closure.rows, closure.slips, closure.active, closure.free, closure.varies
+    return (
+        closure.rows,
+        closure.slips,
+        closure.independent,
+        closure.chosen_coordinates,
+        closure.varies,
+    )
 
 
 @pytest.mark.sweep

@@ -122,12 +122,12 @@ def balanced(mechanism, system, state, F, tolerance=1e-9, forces=None):
 def in_balance(mechanism, system, seed=7):
     """Bodies are in balance in both kinds of coordinates, whose wrenches are the same."""
     rng = np.random.default_rng(seed)
-    v_a, a_a = rng.uniform(-1, 1, (2, len(system.active)))
+    v_a, a_a = rng.uniform(-1, 1, (2, len(system.independent)))
     state = tree_state(system, v_a, a_a)
     F = mbs.models.joint_wrenches(system)(state.q, v_a, a_a)
     balanced(mechanism, system, state, F)
     tau = np.zeros(system.nv)
-    tau[list(system.active)] = np.array(
+    tau[list(system.independent)] = np.array(
         mbs.models.inverse_dynamics(system)(state.q, v_a, a_a)
     ).ravel()
     G = mbs.models.joint_wrenches(system, "tree")(state.q, state.v, state.a, tau)

@@ -43,7 +43,9 @@ BUILDERS = {
     "validity": models.validity,
     "energy": models.energy,
     "gravity_effort": models.gravity_effort,
-    "hybrid_dynamics": lambda s: models.hybrid_dynamics(s, [s.speeds[s.active[0]].name]),
+    "hybrid_dynamics": lambda s: models.hybrid_dynamics(
+        s, [s.velocity_coordinates[s.independent[0]].name]
+    ),
     "inertia_matrix": models.inertia_matrix,
     "inverse_dynamics": models.inverse_dynamics,
     "inverse_dynamics, tree": lambda s: models.inverse_dynamics(s, "tree"),
@@ -198,7 +200,7 @@ def point(system, f, seed=7):
         "p": np.array(system.p_default).reshape(-1, 1),
         "R_0": np.eye(3),
         "x": np.vstack([q, np.zeros((max(0, _rows(f, "x") - len(q)), 1))])[: _rows(f, "x")],
-        "q_a": q[list(system.active)] if len(q) == system.nv else q,
+        "q_a": q[list(system.independent)] if len(q) == system.nv else q,
     }
     values |= {name: value for name, value in fixed.items() if name in values}
     if "T" in values:

@@ -33,7 +33,7 @@ def start_of(system, state, q0=None, v0=None):
         q = solve(system, dict(q0)) if system.is_closed else system.position(q0)
         x[: len(state.positions)] = [q[k] for k in state.positions]
         z = [q[k] for k in state.dependents]
-    names = [system.speeds[k].name for k in state.velocities]
+    names = [system.velocity_coordinates[k].name for k in state.velocities]
     for name, value in (v0 or {}).items():
         x[len(state.positions) + names.index(name)] = value
     return np.array(x), np.array(z)

@@ -59,7 +59,7 @@ def state_of(system, seed=0):
     rng = np.random.default_rng(seed)
     if not system.is_closed:
         return random_state(system, rng)
-    n = len(system.active)
+    n = len(system.independent)
     return np.array(system.configuration), rng.normal(size=n), rng.normal(size=n)
 
 
@@ -83,7 +83,7 @@ class Motion:
     """Symbols of a state, and derivatives in time along it."""
 
     def __init__(self, system):
-        size = len(system.active)
+        size = len(system.independent)
         self.system = system
         self.q = SX.sym("q", system.nq)
         self.v, self.a = SX.sym("v", size), SX.sym("a", size)

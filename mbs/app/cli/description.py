@@ -38,7 +38,7 @@ def description_data(system: System) -> dict[str, Any]:
         "links": _links(system, scalar),
         "inertia": _inertia(system, scalar),
         "coordinates": _coordinates(system),
-        "independent": [system.speeds[k].name for k in system.active],
+        "independent": [system.velocity_coordinates[k].name for k in system.independent],
         "frames": {name: link + 1 for name, (link, _) in system.frames.items()},
         "loops": _loops(system),
         "closure_residual": None if closure is None else closure.residual,

@@ -71,6 +71,6 @@ def _with_mobility(
     with progress("assembling the catalogue", 0.0, len(rows)) as reached:
         for done, row in enumerate(rows, start=1):
             system = robots[row["name"]]().assemble()
-            counted.append({**row, "mobility": len(system.active)})
+            counted.append({**row, "mobility": len(system.independent)})
             reached(float(done))
     return counted

@@ -182,7 +182,7 @@ def _named(table: RobotTable, system: System) -> RobotTable:
 
     The table also gets the name of the system and its assembled configuration as guess.
     """
-    joints = zip(system.coordinates, system.speeds, strict=True)
+    joints = zip(system.coordinates, system.velocity_coordinates, strict=True)
     frames = [
         replace(frame, name=c.name, limits=c.limits, velocity=s.limits, effort=s.effort)
         for frame, (c, s) in zip(table.frames, joints, strict=False)

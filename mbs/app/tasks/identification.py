@@ -46,8 +46,8 @@ def record_columns(system: System) -> dict[str, tuple[str, ...]]:
     return {
         "time": (TIME,),
         "q": tuple(f"{c.name}.q" for c in system.coordinates),
-        "v": tuple(f"{s.name}.v" for s in system.speeds),
-        "tau": tuple(f"{system.speeds[k].name}.tau" for k in system.active),
+        "v": tuple(f"{s.name}.v" for s in system.velocity_coordinates),
+        "tau": tuple(f"{system.velocity_coordinates[k].name}.tau" for k in system.independent),
     }
 
 
@@ -97,7 +97,7 @@ def _positions(system: System, every: Sequence[str], there: Sequence[str]) -> li
     missing = [name for name in every if name not in there]
     if not missing:
         return list(every)
-    independent = [f"{system.speeds[k].name}.q" for k in system.active]
+    independent = [f"{system.velocity_coordinates[k].name}.q" for k in system.independent]
     if system.is_closed and all(name in there for name in independent):
         return independent
     wanted = [name for name in independent if name not in there] if system.is_closed else missing

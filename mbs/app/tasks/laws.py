@@ -111,7 +111,7 @@ def law_of_motion(
     """
     signals = (
         *(f"{c.name}.q" for c in system.coordinates),
-        *(f"{s.name}.v" for s in system.speeds),
+        *(f"{s.name}.v" for s in system.velocity_coordinates),
     )
     read = {
         name: _law(law, f"{system.name}: {what} of {name}", (TIME, *signals), known)

@@ -150,8 +150,8 @@ def _positions(
     values = list(settings.configuration)
     if not settings.motion or len(values) != system.nq:
         return values
-    rates = {speed.name for speed in system.speeds}
-    held = {system.speeds[k].name for k in system.active}
+    rates = {speed.name for speed in system.velocity_coordinates}
+    held = {system.velocity_coordinates[k].name for k in system.independent}
     held -= {name.rpartition(".")[0] for name in settings.motion}
     pairs = zip((c.name for c in system.coordinates), values, strict=True)
     return {name: x for name, x in pairs if name in held or name not in rates}
@@ -162,7 +162,7 @@ def _efforts(system: System, laws: Laws, known: Mapping[str, float]) -> Any:
     if not laws:
         return None
     effort_function(system, dict.fromkeys(laws, 0.0))  # raises for joints that have no motor
-    names = [speed.name for speed in system.speeds]
+    names = [speed.name for speed in system.velocity_coordinates]
     return law_of_motion(system, laws, names, known, "tau")
 
 

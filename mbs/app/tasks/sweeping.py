@@ -126,7 +126,7 @@ def _values(text: str, name: str) -> list[float]:
 def _units(system: System) -> dict[str, str]:
     """Return the units of all quantities that can be varied, by name."""
     positions = ((f"{c.name}.q", c.unit) for c in system.coordinates)
-    rates = ((f"{s.name}.v", s.unit) for s in system.speeds)
-    efforts = ((f"{s.name}.tau", EFFORT_UNIT[s.unit]) for s in system.speeds)
+    rates = ((f"{s.name}.v", s.unit) for s in system.velocity_coordinates)
+    efforts = ((f"{s.name}.tau", EFFORT_UNIT[s.unit]) for s in system.velocity_coordinates)
     parameters = ((p.name, p.unit) for p in system.parameters)
     return dict(itertools.chain(positions, rates, efforts, parameters))

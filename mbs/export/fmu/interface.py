@@ -94,7 +94,7 @@ def interface_of(system: System, inputs: Sequence[str], flanges: Sequence[str]) 
         stem, _, end = text.rpartition(".")
         if end == "wrench":
             wrenches.append(stem)
-        elif end in ("q", "a") and stem in [speed.name for speed in system.speeds]:
+        elif end in ("q", "a") and stem in [speed.name for speed in system.velocity_coordinates]:
             motions.append((stem, "q" if end == "q" else "a"))
         else:
             raise ModelError(
@@ -111,7 +111,7 @@ def interface_of(system: System, inputs: Sequence[str], flanges: Sequence[str]) 
 
 def _possible(system: System) -> Iterator[str]:
     positions = [coordinate.name for coordinate in system.coordinates]
-    for name in (system.speeds[k].name for k in system.active):
+    for name in (system.velocity_coordinates[k].name for k in system.independent):
         yield f"{name}.a"
         if name in positions and not system.is_closed:
             yield f"{name}.q"
@@ -133,7 +133,7 @@ def terminals(
     driven = {name for name, _ in interface.motions}
     joints = (
         _joint(speed.name, speed.unit, names)
-        for speed in system.speeds
+        for speed in system.velocity_coordinates
         if structured_name(f"{speed.name}.tau") in names
         and (speed.actuated or speed.name in driven)
     )

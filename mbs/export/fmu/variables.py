@@ -34,7 +34,7 @@ def states(system: System, state: MinimalState, start: Sequence[float]) -> tuple
 
     start: start values of the positions [rad or m].
     """
-    rates = {speed.name: speed.unit for speed in system.speeds}
+    rates = {speed.name: speed.unit for speed in system.velocity_coordinates}
     positions = [
         FmuState(
             name=f"{coordinate.name}.q",
@@ -59,7 +59,7 @@ def states(system: System, state: MinimalState, start: Sequence[float]) -> tuple
             derivative_unit=ACCELERATION_UNIT[speed.unit],
             output=True,
         )
-        for speed in (system.speeds[k] for k in state.velocities)
+        for speed in (system.velocity_coordinates[k] for k in state.velocities)
     ]
     own = [
         FmuState(
@@ -70,7 +70,7 @@ def states(system: System, state: MinimalState, start: Sequence[float]) -> tuple
             start=value,
             output=True,
         )
-        for (name, unit), value in zip(system.states, system.z_start, strict=True)
+        for (name, unit), value in zip(system.states, system.component_start, strict=True)
     ]
     return (*positions, *velocities, *own)
 
@@ -107,8 +107,8 @@ def inputs(system: System, state: MinimalState, labels: Sequence[str]) -> Iterat
     labels: names of the frames on which external wrenches act.
     """
     for k in state.inputs:
-        name = system.speeds[k].name
-        yield _effort(system.speeds[k], f"effort of the motor of {name}")
+        name = system.velocity_coordinates[k].name
+        yield _effort(system.velocity_coordinates[k], f"effort of the motor of {name}")
     for k in state.devices:
         name, unit = system.inputs[k]
         text = f"input of {name.rpartition('.')[0]}"
@@ -123,7 +123,7 @@ def inputs(system: System, state: MinimalState, labels: Sequence[str]) -> Iterat
 
 
 def _prescribe(system: System, motion: InputMotion) -> Iterator[FmuVariable]:
-    speed = system.speeds[motion.velocity]
+    speed = system.velocity_coordinates[motion.velocity]
     if motion.position is not None:
         position, start = system.coordinates[motion.position], system.configuration[motion.position]
         yield _position(position, f"{position.name}.q", start, "prescribed ")
@@ -142,7 +142,7 @@ def outputs(
         branches: whether start velocities of dependent joints select a branch of motion in a
             singular configuration.
     """
-    speeds = system.speeds
+    speeds = system.velocity_coordinates
     yield from (_acceleration(speeds[k]) for k in state.accelerations)
     for k in state.shown:
         yield _position(system.coordinates[k], f"{system.coordinates[k].name}.q")

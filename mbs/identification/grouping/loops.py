@@ -234,7 +234,7 @@ def configurations_needed(system: System) -> int:
         system: system with closed loops.
     """
     effects = 6 * len(system.tree.links) + system.nv
-    m = max(len(system.active), 1)
+    m = max(len(system.independent), 1)
     return max(12, -(-3 * effects // (m * (m + 1))))
 
 

@@ -174,7 +174,7 @@ def random_states(system: System, p: Array, count: int, seed: int) -> States:
     Raises:
         ModelError: a closed mechanism cannot leave its assembled configuration.
     """
-    m, rng = len(system.active), np.random.default_rng(seed)
+    m, rng = len(system.independent), np.random.default_rng(seed)
     if system.is_closed:
         configurations = closed_positions(system, p, _CONFIGURATIONS, seed)
         q = configurations[:, np.arange(count) % configurations.shape[1]]
@@ -261,7 +261,7 @@ class _ConfigurationWalk:
             q: (nq,) closed configuration.
             rng: random number generator of the directions.
         """
-        direction = rng.uniform(-1, 1, len(self.system.active))
+        direction = rng.uniform(-1, 1, len(self.system.independent))
         for _ in range(_STEPS):
             following = self._step(q, direction)
             if following is None:
@@ -362,7 +362,7 @@ class RegressorSample:
             seed: seed of the random states.
             base_moves: whether the base has a random motion.
         """
-        count = 8 + -(-3 * len(columns) // max(len(system.active), 1))
+        count = 8 + -(-3 * len(columns) // max(len(system.independent), 1))
         states = random_states(system, p, count, seed)
         states = states.on_moving_base(seed) if base_moves else states
         return RegressorSample(tuple(columns), sampled_regressor(system, columns, states, p))

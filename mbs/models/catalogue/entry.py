@@ -227,8 +227,8 @@ def regular_part(
         ModelError: the frame or coordinates are unknown.
     """
     reduced = is_reduced(system, of[2])
-    speeds = system.active if reduced else range(system.nv)
-    names = [system.speeds[k].name for k in speeds]
+    speeds = system.independent if reduced else range(system.nv)
+    names = [system.velocity_coordinates[k].name for k in speeds]
     every = _values(system, of)
     kept = [names.index(n) for n in columns if n in names] if columns else [*range(len(names))]
     chosen = tuple(rows) if rows else tuple(ROWS[k] for k in _independent(every[:, :, kept], 6))
@@ -272,7 +272,7 @@ def _closed_configurations(system: System) -> Iterator[Array]:
     """Yield the assembled configuration, and random configurations nearby with closed loops."""
     yield np.array(system.configuration)
     rng = np.random.default_rng(_SEED)
-    names = [system.speeds[k].name for k in system.free]
+    names = [system.velocity_coordinates[k].name for k in system.chosen_coordinates]
     places = {c.name: x for c, x in zip(system.coordinates, system.configuration, strict=True)}
     own = [name for name in names if name in places]
     for _ in range(_CONFIGURATIONS):
@@ -320,7 +320,10 @@ def _frames(system: System, chosen: Chosen = NOTHING, /) -> Values:
 
 def _speeds(system: System, chosen: Chosen = NOTHING, /) -> Values:
     every = chosen.get("coordinates") == "tree"
-    return tuple(system.speeds[k].name for k in (range(system.nv) if every else system.active))
+    return tuple(
+        system.velocity_coordinates[k].name
+        for k in (range(system.nv) if every else system.independent)
+    )
 
 
 def _rows(system: System, chosen: Chosen = NOTHING, /) -> tuple[str, ...]:

@@ -156,7 +156,7 @@ def _prepared_frame(
             return None
         return _PreparedFrame(kernel, _options_of(system, chain, limits, None))
 
-    prepared: _PreparedFrame | None = system.recent("poses of a frame", key, made, _KEPT)
+    prepared: _PreparedFrame | None = system.memoised("poses of a frame", key, made, _KEPT)
     return prepared
 
 

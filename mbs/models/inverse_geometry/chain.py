@@ -84,7 +84,7 @@ class FrameChain:
     def arm(self, p: NDArray[np.float64]) -> Arm:
         """Return the numeric geometry of the chain for parameters p (np,), cached on the system."""
         key = (*self.key, p.tobytes())
-        arm: Arm = self.system.recent(
+        arm: Arm = self.system.memoised(
             "arm", key, lambda: arm_of(self.chain, self.system.p, p), _KEPT
         )
         return arm
@@ -193,7 +193,7 @@ def frame_chain(
     _require_on_path(system, links, varied, "redundant")
     _require_few(system, name, links, (*locked_positions, *varied), most)
     key = (name, tuple(locked_positions.items()), varied)
-    found: FrameChain = system.recent(
+    found: FrameChain = system.memoised(
         "chain", key, lambda: _frame_chain(system, name, links, locked_positions, varied), _KEPT
     )
     return found

@@ -415,7 +415,7 @@ def general_ready(chain: FrameChain, p: Array) -> General | None:
             return None
 
     key = (*chain.key, p.tobytes())
-    ready: General | None = chain.system.recent("general", key, build, _KEPT)
+    ready: General | None = chain.system.memoised("general", key, build, _KEPT)
     return ready
 
 

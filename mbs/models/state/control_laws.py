@@ -53,7 +53,9 @@ def with_laws_and_crossings(
     of_parts = part_crossings(system) if crossings else None
     if of_parts is not None:
         of_parts = Function(
-            "crossings", list(point), of_parts.call([motion.q, motion.v, system.z, system.u, p])
+            "crossings",
+            list(point),
+            of_parts.call([motion.q, motion.v, system.component_states, system.u, p]),
         )
     found, events = add_crossings(of_parts, point, functions, events, "laws")
     if drive.effort is None and drive.device is None:

@@ -62,7 +62,10 @@ def part_crossings(system: System) -> Function | None:
     parts = PartsAt(system, q, v)
     constants = casadi.vertcat(system.p, parts.modes())
     laws = _jumps(parts.laws(), SX(0, 1), q, constants)
-    states, point = casadi.vertcat(q, v, system.z), [q, v, system.z, system.u, system.p]
+    states, point = (
+        casadi.vertcat(q, v, system.component_states),
+        [q, v, system.component_states, system.u, system.p],
+    )
     given = [one for one in parts.crossings(of_bends=False) if casadi.depends_on(one.value, states)]
     contacts, others = _contacts_and_others(given)
     crossings = WatchedCrossings(
@@ -172,7 +175,7 @@ def simulation_crossings(
     own = conditions_of(parts.laws(), SX(0, 1), q, constants)
     of_parts, counts = with_inputs(system, own.crossings, u), with_inputs(system, own.counts, u)
     given = parts.crossings()
-    states = casadi.vertcat(q, v, system.z)
+    states = casadi.vertcat(q, v, system.component_states)
     results = []
     for every, known, of_time in (
         ([*found.crossings, *of_parts], [one.value for one in given], found.zeros),

@@ -103,8 +103,8 @@ def motions_of(system: System, drive: DriveInputs) -> tuple[InputMotion, ...]:
 
 
 def _motion(system: System, name: str, kind: str) -> InputMotion:
-    speeds = [speed.name for speed in system.speeds]
-    independent = [speeds[k] for k in system.active]
+    speeds = [speed.name for speed in system.velocity_coordinates]
+    independent = [speeds[k] for k in system.independent]
     positions = [coordinate.name for coordinate in system.coordinates]
     if kind not in get_args(Kind):
         raise ModelError(

@@ -81,7 +81,7 @@ def tree_accelerations(
     else:
         model = direct_dynamics(system, coordinates="tree")
         a, drives = outputs_of(system, model, motion.q, motion.v, tau + load)[0], SX(0, 1)
-    return Accelerations(a[list(system.active)], a, _with_drives(tau, given, drives), contact)
+    return Accelerations(a[list(system.independent)], a, _with_drives(tau, given, drives), contact)
 
 
 def independent_accelerations(
@@ -111,7 +111,7 @@ def independent_accelerations(
         a, drives = _hybrid(system, motion, tau + load, given)
     for number, value in given.items():
         a[number] = value
-    a_a = a[list(system.active)]
+    a_a = a[list(system.independent)]
     every = _with_drives(tau, given, drives)
     return Accelerations(a_a, motion.tree_acceleration(a_a), every, contact)
 
@@ -126,7 +126,7 @@ def _with_drives(tau: SX, given: Mapping[int, SX], drives: SX) -> SX:
 
 def _hybrid(system: System, motion: TreeMotion, tau: SX, given: Mapping[int, SX]) -> tuple[SX, SX]:
     """Return accelerations (nv, 1) of the tree and efforts of the prescribed joints."""
-    model = hybrid_dynamics(system, [system.speeds[k].name for k in given])
+    model = hybrid_dynamics(system, [system.velocity_coordinates[k].name for k in given])
     prescribed = casadi.vertcat(*given.values())
     a, drives, *_ = outputs_of(system, model, motion.q, motion.v, tau, prescribed)
     return a, drives
@@ -136,7 +136,9 @@ def _stuck_accelerations(system: System, contact: ContactEquations, motion: Tree
     """Return the accelerations (nv, 1) with contacts, exact for stuck independent joints."""
     a, contacts, stuck = SX(contact.a), contact.contacts, contact.modes.stuck
     back = -RETURN_RATE * contact.state.velocity
-    a[list(system.active)] += standstill(system, contacts, motion, (stuck, back), contact.driven)
+    a[list(system.independent)] += standstill(
+        system, contacts, motion, (stuck, back), contact.driven
+    )
     for j, number in enumerate(contacts.velocities):
         if number is not None:
             a[number] = casadi.if_else(stuck[j], back[j], a[number])
@@ -155,9 +157,9 @@ def _reduced_hybrid(
     """
     (A,) = outputs_of(system, inertia_matrix(system), motion.q)
     (H,) = outputs_of(system, bias(system), motion.q, motion.v_a)
-    driven = [system.active.index(k) for k in given]
-    free = [k for k in range(len(system.active)) if k not in driven]
-    a = SX.zeros(len(system.active))
+    driven = [system.independent.index(k) for k in given]
+    free = [k for k in range(len(system.independent)) if k not in driven]
+    a = SX.zeros(len(system.independent))
     a[driven] = casadi.vertcat(*given.values())
     if free:
         left = tau - H - casadi.mtimes(A, a)
@@ -165,7 +167,7 @@ def _reduced_hybrid(
         a[free] = casadi.ldl_solve(left[free], D, LT, order)
     needed = casadi.mtimes(A, a) + H - tau
     every = SX.zeros(system.nv)
-    every[list(system.active)] = a
+    every[list(system.independent)] = a
     return every, needed[driven]
 
 

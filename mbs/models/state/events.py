@@ -56,7 +56,7 @@ def standstill(
     Returns:
         Change (m, 1) in the order of the independent velocities, of positions or rates as required.
     """
-    active = list(system.active)
+    active = list(system.independent)
     rows = [j for j, number in enumerate(contacts.velocities) if number not in active]
     if not rows:
         return SX.zeros(len(active))
@@ -172,7 +172,7 @@ def _shift(system: System, q: SX, x: SX, shift: SX, positions: Sequence[int]) ->
     after = SX(x)
     if not shift.is_zero():
         v = SX.zeros(system.nv)
-        v[list(system.active)] = shift
+        v[list(system.independent)] = shift
         after[: len(positions)] += position_rate(system.tree, q, v)[list(positions)]
     return after
 
@@ -317,7 +317,7 @@ def join_part_events(
         there, changed = contacts.jump.call([*every, fired[:count]])
         jumps = casadi.mmax(fired[:count])
         after, now = casadi.if_else(jumps, there, x), casadi.if_else(jumps, changed, modes)
-    start = x.numel() - system.z.numel()
+    start = x.numel() - system.component_states.numel()
     after = casadi.vertcat(after[:start], after_events(system, own, fired[count:]))
     indicators = casadi.vertcat(watched, *(event.when for event in own))
     allowed = casadi.vertcat(beyond, -SX.ones(len(own)))
@@ -336,7 +336,7 @@ def join_part_events(
 def at_limits(system: System, contact: ContactEquations | None, motion: TreeMotion) -> SX:
     """Return rates (m, 1) of independent positions that return dependent ones to their limits."""
     if contact is None:
-        return SX.zeros(len(system.active))
+        return SX.zeros(len(system.independent))
     return RETURN_RATE * to_limits(system, contact, motion, contact.modes.limit)
 
 

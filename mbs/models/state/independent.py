@@ -152,7 +152,7 @@ def motion_of(system: System, layout: MinimalLayout, s: StatePoint) -> TreeMotio
     for motion, law in zip(layout.motions, laws, strict=True):
         if motion.position is not None:
             raw[motion.position], v[motion.velocity] = law[0], law[1]
-    return tree_motion(system, raw, q, v[list(system.active)])
+    return tree_motion(system, raw, q, v[list(system.independent)])
 
 
 def positions_of(system: System, layout: MinimalLayout, s: StatePoint) -> tuple[SX, SX]:
@@ -169,7 +169,7 @@ def _rate(system: System, layout: MinimalLayout, at: EquationsOfMotion) -> SX:
     """Return the rate of x, with decay of quaternions to unit length."""
     motion, response = at.motion, at.response
     v = SX(motion.v)
-    v[list(system.active)] += at_limits(system, response.contact, motion)
+    v[list(system.independent)] += at_limits(system, response.contact, motion)
     if system.is_closed:
         rate = state_rates(system, layout.orientations, (motion.raw, motion.q, v))
     else:
@@ -213,7 +213,7 @@ def consistent_start(system: System, state: MinimalLayout) -> tuple[list[float],
     """Return state x and dependents z of the assembled configuration at rest."""
     configuration = np.array(system.configuration)
     rest = [0.0] * len(state.velocities)
-    x = [*configuration[list(state.positions)], *rest, *system.z_start]
+    x = [*configuration[list(state.positions)], *rest, *system.component_start]
     return [float(value) for value in x], [
         float(value) for value in configuration[list(state.dependents)]
     ]

@@ -82,10 +82,12 @@ def motors_of(system: System, prescribed: Sequence[int] = ()) -> tuple[int, ...]
         system: open or closed system.
         prescribed: indices of velocities with prescribed motion, which are excluded.
     """
-    others = [k for k in range(system.nv) if k not in system.active]
+    others = [k for k in range(system.nv) if k not in system.independent]
     taken = [*prescribed, *(device.velocity for device in system.devices)]
     return tuple(
-        k for k in (*system.active, *others) if system.speeds[k].actuated and k not in taken
+        k
+        for k in (*system.independent, *others)
+        if system.velocity_coordinates[k].actuated and k not in taken
     )
 
 
@@ -110,7 +112,7 @@ def minimal_layout(system: System, drive: DriveInputs) -> MinimalLayout:
     return MinimalLayout(
         positions=tuple(k for k in free if k not in inputs_q),
         orientations=orientations,
-        velocities=tuple(k for k in system.active if k not in without_states),
+        velocities=tuple(k for k in system.independent if k not in without_states),
         dependents=tuple(k for k in range(system.nq) if k not in free or k in solved),
         shown=tuple(k for k in range(system.nq) if k not in free),
         inputs=() if drive.effort else motors,
@@ -119,7 +121,7 @@ def minimal_layout(system: System, drive: DriveInputs) -> MinimalLayout:
         frames=frames_of(system, drive),
         motions=motions,
         extra=extra,
-        accelerations=tuple(k for k in system.active if k not in prescribed),
+        accelerations=tuple(k for k in system.independent if k not in prescribed),
         passive=system.closure.passive if system.closure else (),
         efforts=(*(motors if drive.effort else ()), *prescribed),
         contacts=contact_efforts(contacts_of(system)),
@@ -132,7 +134,10 @@ def _free_positions(system: System, orientations: Sequence[Orientation]) -> tupl
         return tuple(range(system.nq))
     numbers = {coordinate.name: k for k, coordinate in enumerate(system.coordinates)}
     joints = {k: joint.positions for joint in orientations for k in joint.free}
-    found = (joints.get(k) or (numbers[system.speeds[k].name],) for k in system.free)
+    found = (
+        joints.get(k) or (numbers[system.velocity_coordinates[k].name],)
+        for k in system.chosen_coordinates
+    )
     return tuple(dict.fromkeys(position for part in found for position in part))
 
 
@@ -170,7 +175,7 @@ def point_of(system: System, layout: MinimalLayout, motors: Sequence[int]) -> St
     in_x = [len(layout.positions), len(layout.velocities), state_count(system)]
     in_u = [len(motors), system.u.numel(), 6 * len(layout.frames)]
     in_u.append(sum(motion.size for motion in layout.motions))
-    x = casadi.vertcat(SX.sym("x", sum(in_x[:2])), system.z)
+    x = casadi.vertcat(SX.sym("x", sum(in_x[:2])), system.component_states)
     u = casadi.vertcat(SX.sym("u", in_u[0]), system.u, SX.sym("w", sum(in_u[2:])))
     parts = (*_split(x, in_x), *_split(u, in_u))
     return StatePoint(SX.sym("t"), x, SX.sym("z", len(layout.dependents)), u, *parts)

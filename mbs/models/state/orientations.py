@@ -56,7 +56,7 @@ class Orientation:
 
 def orientations_of(system: System) -> tuple[Orientation, ...]:
     """Return the quaternion joints of a closed system with at least one independent velocity."""
-    free = set(system.free)
+    free = set(system.chosen_coordinates)
     found = (
         Orientation(link, tuple(k for k in range(link.v.start, link.v.stop) if k in free))
         for link in system.tree.links

@@ -146,7 +146,7 @@ class DriveConstraints(NamedTuple):
 def _drive_constraints(
     system: System, q: SX, motions: Sequence[Prescribed], t: SX
 ) -> DriveConstraints:
-    laws = [(motion, *motion.law(t, system.z, system.p)) for motion in motions]
+    laws = [(motion, *motion.law(t, system.component_states, system.p)) for motion in motions]
     g = [q[m.position] - q_p for m, q_p, _, _ in laws if m.position is not None]
     prescribed = [(m.velocity, v_p) for m, _, v_p, _ in laws if m.holds_speed]
     J = SX(DM.eye(system.nv))[[k for k, _ in prescribed], :]
@@ -254,7 +254,7 @@ def _position_scales(system: System) -> Array:
 
 def _velocity_scales(system: System) -> Array:
     """Return the typical sizes (nv,) of the velocities."""
-    return scales(system).columns([speed.unit for speed in system.speeds])
+    return scales(system).columns([speed.unit for speed in system.velocity_coordinates])
 
 
 class LinearisedConstraints(NamedTuple):

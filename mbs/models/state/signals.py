@@ -101,7 +101,7 @@ def _trace(
     _check_inputs(system, signal, function, point)
     t, q, v = point
     if isinstance(function, Function) and function.numel_in(2) != v.numel():
-        v = v[list(system.active)]
+        v = v[list(system.independent)]
     try:
         values = function(t, q, v)
     except Exception as error:
@@ -209,7 +209,7 @@ def _check_inputs(
     if isinstance(function, Function):
         sizes = [function.numel_in(k) for k in range(function.n_in())]
         expected = [symbol.numel() for symbol in point]
-        independent = [*expected[:2], len(system.active)]
+        independent = [*expected[:2], len(system.independent)]
         if sizes not in (expected, independent) or function.n_out() != 1:
             other = "" if independent == expected else f" or {independent}"
             raise ModelError(
@@ -254,9 +254,9 @@ def effort_function(system: System, tau: Effort) -> Function | None:
     """
     if tau is None:
         return None
-    names = [speed.name for speed in system.speeds]
+    names = [speed.name for speed in system.velocity_coordinates]
     signal = LawArgument("tau", "efforts", names, system.motors)
-    driven = [speed.name for speed in system.speeds if speed.actuated]
+    driven = [speed.name for speed in system.velocity_coordinates if speed.actuated]
     if callable(tau):
         return signal_function(system, signal, tau, driven)
     given = system.plain_names(tau, EFFORTS)
@@ -312,7 +312,7 @@ def given_inputs(system: System, names: Sequence[str]) -> tuple[GivenInput, ...]
         ModelError: a name is unknown or repeated, or a joint has no motor.
     """
     names = names_given(f"{system.name}: inputs", names, "j1.tau")
-    efforts = [f"{speed.name}.tau" for speed in system.speeds]
+    efforts = [f"{speed.name}.tau" for speed in system.velocity_coordinates]
     inputs = [name for name, _ in system.inputs]
     found: dict[str, GivenInput] = {}
     for given in names:
@@ -327,8 +327,10 @@ def given_inputs(system: System, names: Sequence[str]) -> tuple[GivenInput, ...]
             found[name] = GivenInput(name, False, index, float(system.u_default[index]))
         else:
             index = efforts.index(name)
-            if not system.speeds[index].actuated:
-                driven = ", ".join(f"{s.name}.tau" for s in system.speeds if s.actuated)
+            if not system.velocity_coordinates[index].actuated:
+                driven = ", ".join(
+                    f"{s.name}.tau" for s in system.velocity_coordinates if s.actuated
+                )
                 raise ModelError(
                     f"{system.name}: inputs names {name}, but that joint has no motor; make it"
                     f" actuated=True, or use one of {driven or '(none)'}"

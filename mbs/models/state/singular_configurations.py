@@ -130,7 +130,7 @@ def without_passages(system: System, arguments: StateArguments) -> Passage:
         system: open or closed system.
         arguments: arguments of the functions.
     """
-    nq, nv, nz = system.nq, system.nv, system.z.numel()
+    nq, nv, nz = system.nq, system.nv, system.component_states.numel()
     wide = nq > nv  # the system has unit quaternions
     rows = PassageRows(
         position=SX(0, 1),
@@ -173,7 +173,7 @@ def _loop_group(system: System, q: SX, v: SX) -> ConstraintGroup | None:
 
 def _drive_group(system: System, q: SX, motions: Sequence[Prescribed], t: SX) -> ConstraintGroup:
     """Return the constraints of prescribed motions, whose positions are all prescribed."""
-    laws = [motion.law(t, system.z, system.p) for motion in motions]
+    laws = [motion.law(t, system.component_states, system.p) for motion in motions]
     positions = [motion.position for motion in motions if motion.position is not None]
     errors = [q[k] - q_p for k, (q_p, _, _) in zip(positions, laws, strict=True)]
     return ConstraintGroup(
@@ -288,7 +288,7 @@ def _regularity(system: System, q: SX, drives: SX) -> SX:
         drives: (m, nv) rows of the prescribed motions.
     """
     found = scales(system)
-    columns = DM(found.columns([speed.unit for speed in system.speeds]))
+    columns = DM(found.columns([speed.unit for speed in system.velocity_coordinates]))
     J = casadi.vertcat(
         DM(found.rows[kept_rows(system)]) * independent_constraint_rows(system, q), drives
     )

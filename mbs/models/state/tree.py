@@ -85,7 +85,7 @@ def tree_equations(
     """
     t, x, *_ = point
     q, v, states = casadi.vertsplit(x, [0, system.nq, system.nq + system.nv, x.numel()])
-    motion = TreeMotion(q, q, v[list(system.active)], v, None, SX.zeros(system.nv))
+    motion = TreeMotion(q, q, v[list(system.independent)], v, None, SX.zeros(system.nv))
     at = equations_of_motion(system, motion, actions, tree_accelerations)
     contact = at.response.contact
     arguments = state_arguments(system, point, contact, inputs, every_mode=every_mode)
@@ -161,7 +161,7 @@ def tree_state(
     if layout.motions or not (layout.dependents or slips):
         return None
     nq, n = system.nq, system.nq + system.nv
-    X, none = casadi.vertcat(SX.sym("X", n), system.z), SX.sym("z", 0)
+    X, none = casadi.vertcat(SX.sym("X", n), system.component_states), SX.sym("z", 0)
     tree = tree_equations(system, (s.t, X, none, s.u, system.p), inputs.actions())
     arguments, through = tree.arguments, tree.passage
     passes = through is not None
@@ -209,7 +209,7 @@ def tree_state(
         dependents=layout.dependents,
         passive=tuple(nq + k for k in layout.passive),
         independent=layout.velocities,
-        units=tuple(scales(system).columns([speed.unit for speed in system.speeds])),
+        units=tuple(scales(system).columns([speed.unit for speed in system.velocity_coordinates])),
     )
 
 
@@ -273,7 +273,7 @@ def full_state(
             of p and replace the values of `effort` and `inputs`.
     """
     nq, n = system.nq, system.nq + system.nv
-    t, x = SX.sym("t"), casadi.vertcat(SX.sym("x", n), system.z)
+    t, x = SX.sym("t"), casadi.vertcat(SX.sym("x", n), system.component_states)
     q, v, p = x[:nq], x[nq:n], system.p
     tau = SX.zeros(system.nv) if effort is None else casadi.densify(effort(t, q, v, p))
     u = SX(DM(system.u_default)) if inputs is None else casadi.densify(SX(inputs(t, q, v, p)))
@@ -281,7 +281,7 @@ def full_state(
         symbol = SX.sym(one.name)
         (tau if one.is_effort else u)[one.index] = symbol
         p = casadi.vertcat(p, symbol)
-    driven = {one.velocity: one.law(t, system.z, system.p)[2] for one in motions}
+    driven = {one.velocity: one.law(t, system.component_states, system.p)[2] for one in motions}
     tree = tree_equations(system, (t, x, p), Actions(tau, driven), motions, u, every_mode=True)
     arguments, response, parts = tree.arguments, tree.at.response, tree.at.parts
     contact = response.contact
@@ -291,7 +291,7 @@ def full_state(
     shown = [response.a, response.tau, u, tree.at.shown, contact_efforts, E, U, openness]
     has_constraints = system.is_closed or motions or contact or quaternion_slices(system.tree)
     laws = [law(t, q, v, system.p) for law in (effort, inputs) if law is not None]
-    laws += [law for one in motions for law in one.law(t, system.z, system.p)]
+    laws += [law for one in motions for law in one.law(t, system.component_states, system.p)]
     found = simulation_crossings(system, (t, q, v), u, laws, parts)
     return FullState(
         rhs=arguments.function("rhs", [tree.rate]),

@@ -45,7 +45,7 @@ URDF = """
 def efforts(robot: str) -> np.ndarray:
     """tau of the inverse dynamic model at an irregular state, (n,)."""
     system = mbs.load(robot).assemble()
-    n, m = system.nq, len(system.active)
+    n, m = system.nq, len(system.independent)
     q = mbs.loops.solve(system, {}) if system.is_closed else np.linspace(0.3, 0.9, n)
     state = (q, np.linspace(1, 2, m), np.linspace(-1, 1, m))
     return np.array(mbs.models.inverse_dynamics(system)(*state)).ravel()

@@ -64,7 +64,7 @@ def test_show_gives_the_tables_of_the_system(command) -> None:
     for row, link in zip(data["inertia"], system.tree.links, strict=True):
         assert row["M"] == float(link.inertia.parameters[9])
     assert [row["configuration"] for row in data["coordinates"]] == list(system.configuration)
-    assert data["independent"] == [system.speeds[k].name for k in system.active]
+    assert data["independent"] == [system.velocity_coordinates[k].name for k in system.independent]
     assert data["report"] == system.report()
     text = command("show", "sr400").out
     assert "Inertial parameters" in text

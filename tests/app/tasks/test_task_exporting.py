@@ -87,8 +87,12 @@ def test_toml_keeps_names_ranges_and_configuration(tmp_path):
         assert again.name == system.name
         assert [c.name for c in again.coordinates] == [c.name for c in system.coordinates]
         assert [c.limits for c in again.coordinates] == [c.limits for c in system.coordinates]
-        assert [s.limits for s in again.speeds] == [s.limits for s in system.speeds]
-        assert [s.effort for s in again.speeds] == [s.effort for s in system.speeds]
+        assert [s.limits for s in again.velocity_coordinates] == [
+            s.limits for s in system.velocity_coordinates
+        ]
+        assert [s.effort for s in again.velocity_coordinates] == [
+            s.effort for s in system.velocity_coordinates
+        ]
         np.testing.assert_allclose(again.configuration, system.configuration, atol=1e-9)
 
 

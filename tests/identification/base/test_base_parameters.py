@@ -92,7 +92,7 @@ def test_written_as_robot_files_and_read_again(name, tmp_path):
     mbs.export.par(base.apply(), files[0])
     write_toml(read_par(files[0]), files[1])
     q = np.array(system.configuration)
-    v, a = np.random.default_rng(2).uniform(-2, 2, (2, len(system.active)))
+    v, a = np.random.default_rng(2).uniform(-2, 2, (2, len(system.independent)))
     expected = np.array(mbs.models.inverse_dynamics(system)(q, v, a))
     for path in files:
         again = mbs.load(path).assemble()

@@ -159,7 +159,7 @@ def test_same_seed_gives_the_same_motion() -> None:
 
 def test_closed_robot_keeps_its_loop_closed() -> None:
     system = system_of("five_bar")
-    middle = [system.configuration[k] for k in system.active]
+    middle = [system.configuration[k] for k in system.independent]
     found = excitation(
         system,
         series=FORM,
@@ -172,9 +172,9 @@ def test_closed_robot_keeps_its_loop_closed() -> None:
     )
     t = np.linspace(0, 6, 25)
     configurations = found.configuration(t)
-    assert configurations[:, list(system.active)] == pytest.approx(found.q(t), abs=1e-14)
+    assert configurations[:, list(system.independent)] == pytest.approx(found.q(t), abs=1e-14)
     for q in configurations[::6]:
-        closed = mbs.loops.solve(system, q[list(system.active)].tolist())
+        closed = mbs.loops.solve(system, q[list(system.independent)].tolist())
         assert np.array(closed).ravel() == pytest.approx(q, abs=1e-9)
     assert len(found.columns) == 19
     assert found.scaled_condition < 100
@@ -185,7 +185,7 @@ def test_loops_without_closed_form_are_followed(monkeypatch: pytest.MonkeyPatch)
         raise NoClosedForm("no closed form")
 
     system = mbs.load("five_bar").assemble()
-    middle = [system.configuration[k] for k in system.active]
+    middle = [system.configuration[k] for k in system.independent]
     options = {
         "series": FORM,
         "position": [(x - 0.3, x + 0.3) for x in middle],

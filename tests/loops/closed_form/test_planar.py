@@ -78,7 +78,7 @@ def test_the_assembled_branch_is_followed(system):
     rng = np.random.default_rng(1)
     assert same(system, np.array(function(system)(active(system))).ravel(), system.configuration)
     for _ in range(3):
-        q_a = active(system) + rng.uniform(-0.03, 0.03, len(system.active))
+        q_a = active(system) + rng.uniform(-0.03, 0.03, len(system.independent))
         q = np.array(function(system)(q_a)).ravel()
         assert same(system, q, solve(system, list(q_a)), 1e-8)
 

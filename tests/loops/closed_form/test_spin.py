@@ -36,7 +36,11 @@ def test_both_ways_close(kinds, cut):
 @pytest.mark.parametrize("cut", [1, 2, 3])
 def test_the_spin_turns_the_rod_about_its_line(cut):
     system = ring_loop(1, "RSSR", cut=cut).assemble()
-    spins = [system.speeds[k].name for k in system.free if system.speeds[k].name != "j0"]
+    spins = [
+        system.velocity_coordinates[k].name
+        for k in system.chosen_coordinates
+        if system.velocity_coordinates[k].name != "j0"
+    ]
     assert len(spins) == 1
     frames = {}
     for angle in (0.0, 0.4, -2.0):
@@ -84,14 +88,18 @@ def test_the_range_leaves_the_spin_out():
 
 def test_a_spin_that_is_no_number():
     system = ring_loop(1, "RSSR").assemble()
-    spin = next(system.speeds[k].name for k in system.free if system.speeds[k].name != "j0")
+    spin = next(
+        system.velocity_coordinates[k].name
+        for k in system.chosen_coordinates
+        if system.velocity_coordinates[k].name != "j0"
+    )
     with pytest.raises(ModelError, match="give a finite number"):
         assembly_modes(system, {spin: np.nan})
 
 
 def test_the_spin_is_named_among_the_inputs():
     system = ring_loop(1, "RSSR").assemble()
-    names = [system.speeds[k].name for k in system.free]
+    names = [system.velocity_coordinates[k].name for k in system.chosen_coordinates]
     pose = direct_geometry(system)
     assert pose.elements("q_a") == [(name, "rad") for name in names]
     with pytest.raises(ModelError, match=f"3 values, it needs 2: {', '.join(names)}$"):

@@ -100,7 +100,7 @@ def test_forearms_that_are_bodies():
 
 
 def check_slope(system, mode):
-    x = casadi.SX.sym("x", len(system.free))
+    x = casadi.SX.sym("x", len(system.chosen_coordinates))
     slope = casadi.jacobian(function(system, mode.branch)(x), x)
     G = np.array(casadi.Function("G", [x], [slope])(active(system)))
     np.testing.assert_allclose(G, np.array(reduction_matrix(system)(list(mode.q))), atol=1e-9)
@@ -151,5 +151,5 @@ def test_two_rods_hold_a_point_in_a_plane():
 
 def test_one_rod_for_two_slides_leaves_one_of_them_independent():
     system = held_in_a_plane(1)
-    assert len(system.free) == 2
+    assert len(system.chosen_coordinates) == 2
     assert len(assembly_modes(system)) == 2

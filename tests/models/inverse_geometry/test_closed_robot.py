@@ -74,7 +74,7 @@ def test_both_assemblies_of_the_sr400(systems, way, seed):
     """The motors far from the assembled configuration, the loop a parallelogram or crossed."""
     system = systems["sr400"]
     rng = np.random.default_rng(seed)
-    names = [system.speeds[k].name for k in system.free]
+    names = [system.velocity_coordinates[k].name for k in system.chosen_coordinates]
     motors = dict(zip(names, rng.uniform(-2.5, 2.5, 6), strict=True))
     q = mbs.loops.solve(system, motors, branch=f"q9:{way}")
     T = pose(system, 6, q)

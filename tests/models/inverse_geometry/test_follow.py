@@ -321,7 +321,7 @@ def test_chains_of_fewer_than_six_joints(robot, frame):
 )
 def test_closed_loops_stay_closed(robot, frame):
     system = catalogue_system(robot)
-    names = [system.speeds[k].name for k in system.free]
+    names = [system.velocity_coordinates[k].name for k in system.chosen_coordinates]
     places = [[c.name for c in system.coordinates].index(name) for name in names]
     start = np.array(system.configuration)[places]
     away = 0.03 if robot == "akr3000" else 0.3

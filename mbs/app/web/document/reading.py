@@ -337,7 +337,7 @@ def shown_tables(system: System, tables: Tables) -> Tables:
 
 def _geometry(system: System, row: LinkRow) -> Texts:
     """Return the cells that show the frame of a link of an assembled mechanism."""
-    speeds = system.speeds[system.tree.links[row.number - 1].v]
+    speeds = system.velocity_coordinates[system.tree.links[row.number - 1].v]
     places = system.coordinates[system.tree.links[row.number - 1].q]
     cells = dict.fromkeys(GEOMETRY_COLUMNS, "")
     cells |= {key: _text(getattr(row, key)) for key in GEOMETRY}

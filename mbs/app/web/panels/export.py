@@ -65,7 +65,9 @@ def _fmu_card(app: App, system: System, form: _ExportForm) -> None:
         )
         outputs = option_fields(FmuOptions)["outputs"][1].offered
         offered = {"outputs": [name for name in outputs if _is_offered(system, name)]}
-        joint = system.speeds[system.active[0]].name if system.active else "j1"
+        joint = (
+            system.velocity_coordinates[system.independent[0]].name if system.independent else "j1"
+        )
         option_form(FmuOptions, form.fmu, offered, joint)
 
         async def make() -> None:

@@ -275,7 +275,11 @@ def _explain(system: System) -> None:
     columns = record_columns(system)
     names = [*columns["time"], *columns["q"], *columns["tau"]]
     if system.is_closed:
-        names = ["time", *(f"{system.speeds[k].name}.q" for k in system.active), *columns["tau"]]
+        names = [
+            "time",
+            *(f"{system.velocity_coordinates[k].name}.q" for k in system.independent),
+            *columns["tau"],
+        ]
     more = len(names) - _LONGEST_LIST
     listed = ", ".join(names[:_LONGEST_LIST]) + (f" and {more} more" if more > 0 else "")
     ui.label(

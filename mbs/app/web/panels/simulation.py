@@ -63,7 +63,7 @@ def chosen_rows(system: System) -> list[Row]:
         system: system to simulate.
     """
     units = {c.name: c.unit for c in system.coordinates}
-    speeds = [system.speeds[k] for k in system.active]
+    speeds = [system.velocity_coordinates[k] for k in system.independent]
     return [(s.name, units.get(s.name, ""), s.unit, s.actuated) for s in speeds]
 
 
@@ -195,7 +195,11 @@ def groups_of(system: System, result: Result) -> dict[str, Charts]:
     Returns:
         title of a group to its charts; groups without signals are omitted.
     """
-    joints = {f"{c.name}.{kind}" for c in (*system.coordinates, *system.speeds) for kind in _KINDS}
+    joints = {
+        f"{c.name}.{kind}"
+        for c in (*system.coordinates, *system.velocity_coordinates)
+        for kind in _KINDS
+    }
     groups: dict[str, Charts] = {title: {} for title in _KINDS.values()}
     groups |= {"Energy": {}, "Closure": {}, "Others": {}}
     for name, unit in result.units.items():

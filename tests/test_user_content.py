@@ -241,7 +241,7 @@ def arguments(tmp_path):
         "`sweep(q0=)`": (lambda x: swept({"j1.tau": [0.1]}, q0=x, v0={}, z0={}), positions(Q)),
         "`assemble(guess=)`": (lambda x: mechanism().assemble(guess=x).configuration, by_name(Q)),
         "`assemble(active=)`": (
-            lambda x: mechanism(guess={"j2": 1.0}).assemble(active=x).free,
+            lambda x: mechanism(guess={"j2": 1.0}).assemble(active=x).chosen_coordinates,
             names("j2"),
         ),
         "`loops.solve(q_active)`": (lambda x: mbs.loops.solve(loop(), x), positions(Q)),

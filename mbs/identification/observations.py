@@ -180,7 +180,7 @@ def with_regular(model: Any, samples: Samples) -> Samples:
 
 def _is_reduced(model: Any) -> bool:
     """Whether the model is in the independent velocities of a closed system."""
-    return bool(model.system.is_closed and int(model.size1_in(1)) == len(model.system.active))
+    return bool(model.system.is_closed and int(model.size1_in(1)) == len(model.system.independent))
 
 
 def _has_elements(system: System) -> bool:

@@ -284,9 +284,10 @@ class Contact(ForceElement):
         )
 
     def rates(self, at: At) -> Mapping[str, SX]:
-        """Return the rate [m/s] of each bristle state bristle_AXIS + label.
+        """Return the rate [m/s] of each bristle state, named bristle_AXIS followed by a label.
 
-        Empty without bristles.
+        AXIS is x, y or z in the axes of the ground. The label is that of the contact
+        point, see `labels`. Empty without bristles.
 
         Args:
             at: values of the component and motion of its ports, see `custom.At`.
@@ -335,10 +336,11 @@ class Contact(ForceElement):
         }
 
     def approach(self, motion: RelativeMotion, spot: Spot, at: At) -> tuple[SX | None, SX]:
-        """Return speed [m/s] and pace [1/s] of the depth of a contact point, see `custom.Approach`.
+        """Return the speed [m/s] and the pace [1/s] of the depth of a contact point.
 
-        The speed bounds the speed of all points of the body. The obstacle size is the distance of
-        the contact point from the body's frame, at least 1 cm.
+        The speed bounds the speed of all points of the body; derived classes return None if no
+        bound exists. The pace is the speed divided by the size of the obstacle, which is the
+        distance of the contact point from the body's frame, at least 1 cm. See `custom.Approach`.
 
         Args:
             motion: motion of the body's frame relative to the ground's frame.

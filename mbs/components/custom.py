@@ -849,6 +849,9 @@ class Custom(OnPoints):
     def positive(self, at: At) -> Mapping[str, SX]:
         """Return expressions by label that are positive at the intended configurations only.
 
+        The rows of a loop also have solutions with opposed axes. Loop closure takes a solution at
+        which all these expressions are positive.
+
         Args:
             at: values of the component and motion of its ports, see `custom.At`.
         """

@@ -90,7 +90,8 @@ class WheelSet(Custom):
     def outputs(self, at: At) -> Mapping[str, SX]:
         """Return the forces of the ground ON the wheels [N].
 
-        Names: force_left, force_right (in the direction of travel), force_lateral, force_normal.
+        Names: force_left and force_right in the direction of travel, force_lateral along y of the
+        axle, force_normal away from the plane.
 
         Args:
             at: values of the component and motion of its ports, see `custom.At`.

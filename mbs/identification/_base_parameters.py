@@ -434,7 +434,10 @@ class BaseParameters:
         return tuple(column for column in self.eliminated if column.name not in used)
 
     def text(self) -> str:
-        """Return a printable report: base parameters with units, their equations, and the check."""
+        """Return a printable report: base parameters with units, their equations, and the check.
+
+        The check confirms their number and their equations at random states.
+        """
         rows = [(name, c.unit) for name, c in zip(self.names, self.kept, strict=True)]
         without = ", ".join(column.name for column in self.without_effect) or "none"
         grouped = [c.name for c in self.eliminated if c not in self.without_effect]

@@ -249,7 +249,10 @@ class _Loop:
 
 
 def characteristic(problem: Problem) -> Characteristic:
-    """Return the characteristic matrix of the loop for which it is farthest from singular.
+    """Return the characteristic matrix of a closed loop of six joints.
+
+    Loops begin at any of the six joints and run in either direction. The loop is chosen whose
+    matrix is farthest from singular.
 
     Source: Raghavan & Roth 1993; Manocha & Canny 1994.
 

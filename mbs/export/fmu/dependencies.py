@@ -239,7 +239,10 @@ def _references(model: FmuModel, kind: Kind) -> range:
 
 
 def _level(model: FmuModel, kind: Kind, reference: int) -> DependencyKind:
-    """Return the kind of a variable when it is a factor."""
+    """Return the dependency kind of FMI of a product with a variable as a factor.
+
+    `kind` is the kind of the variable, such as "mode", and `reference` its value reference.
+    """
     if kind == "mode":
         return "discrete"
     if kind != "parameter":

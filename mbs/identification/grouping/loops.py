@@ -289,8 +289,8 @@ def _inertia_effects(j: int, rows: Array) -> Iterator[Effect]:
 def _velocity_products(first: Array, second: Array) -> Array:
     """Return products of two velocities, `first` and `second` (configurations, m), as one vector.
 
-    Each product is a quadratic form in the m independent velocities; its coefficients are listed
-    for every configuration.
+    Each product is a quadratic form in the m independent velocities. Its m (m + 1) / 2 coefficients
+    are listed for every configuration.
     """
     k, i = np.triu_indices(first.shape[1])
     return np.ravel(first[:, k] * second[:, i] + first[:, i] * second[:, k])

@@ -240,8 +240,8 @@ class Family:
     def configurations_from(self, value: float) -> Array:
         """Return the samples (k, n) of the chain, sorted by |free joint - value|.
 
-        Of equally near samples, such as both ends of half a revolution, samples above the value
-        come first, so that rounding does not decide.
+        Angles are compared modulo a revolution. Of equally near samples, such as both ends of half
+        a revolution, samples above the value come first, so that rounding does not decide.
         """
         motion = self._motion
         away = motion.target.wrapped(self._motion.curve.x - value / motion.target.unit)

@@ -46,7 +46,8 @@ def test_python_blocks_run_in_the_installation_that_is_documented(
     assert ran.returncode == 0, ran.stderr
     printed, text = ran.stdout, page.read_text(encoding="utf-8")
     if page.name in ("README.md", "getting_started.md"):
-        quoted = re.search(r"The report says what was found:\n\n(.*?)\n\n", text, re.DOTALL)
+        introduction = "The report lists the structure and the mobility:\n\n"
+        quoted = re.search(rf"{introduction}(.*?)\n\n", text, re.DOTALL)
         assert quoted is not None
         assert "\n".join(row[4:] for row in quoted[1].splitlines()) in printed
     if page.name == "README.md":

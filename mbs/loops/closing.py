@@ -943,17 +943,22 @@ def unwound(closing: Closing, q: Vector, start: Vector) -> Vector:
     """
     near: Vector = start + difference(closing.system, q, start)
     for part in quaternion_slices(closing.system.tree):
-        near[part] = _sign(q[part], start[part]) * q[part]
+        near[part] = quaternion_sign(q[part], start[part]) * q[part]
     near[list(closing.locked)] = q[list(closing.locked)]
     return near if closing.openness(near) < CLOSED else q
 
 
-def _sign(quaternion: Vector, start: Vector) -> float:
+def quaternion_sign(quaternion: Vector, start: Vector | None = None) -> float:
     """Return -1 if the negative of a unit quaternion is nearer to the quaternion `start`, else 1.
 
-    If both are equally near, the sign makes the first nonzero element positive.
+    If both are equally near, or without a start, the sign makes the first nonzero element positive.
+
+    Args:
+        quaternion: (4,) unit quaternion.
+        start: (4,) unit quaternion, or None.
     """
-    for value in (float(quaternion @ start), *quaternion):
+    near = () if start is None else (float(quaternion @ start),)
+    for value in (*near, *quaternion):
         if abs(value) > _HALF_TURN:
             return float(np.sign(value))
     return 1.0

@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 
 from mbs.assembly import System
 from mbs.assembly.tables import Coordinate
-from mbs.loops.closing import Closing, difference, distance_units, row_difference
+from mbs.loops.closing import (
+    Closing,
+    difference,
+    distance_units,
+    quaternion_sign,
+    row_difference,
+)
 from mbs.loops.cut_positions import cut_positions_and_slopes
 
 Vector = NDArray[np.float64]
@@ -125,7 +131,7 @@ class GuessTarget:
         found = np.array(found, dtype=float)
         for first in [k for k, row in enumerate(self.rows) if row.kind == "quaternion"][::4]:
             part = slice(first, first + 4)
-            found[part] *= np.sign(next((x for x in found[part] if abs(x) > EQUAL), 1.0))
+            found[part] *= quaternion_sign(found[part])
         return found
 
     def _at_cut(self, q: Vector) -> Vector:

@@ -21,7 +21,7 @@ _TRACEBACK = "MBS_TRACEBACK"
 def main() -> None:
     """Run the command line with the arguments of the process, then exit with an exit code.
 
-    The exit codes are those of the module docstring.
+    The module docstring lists the exit codes.
     """
     from mbs.app.cli.application import application
 

@@ -102,7 +102,7 @@ def _with_numbers(rows: Sequence[CountRow]) -> list[CountRow]:
 
 
 def _data(row: CountRow, optimise: bool) -> dict[str, Any]:
-    """Return the counts of a model as data for JSON; `optimise` includes those of the optimizer."""
+    """Return the counts of a model as data for JSON; `optimise` adds the optimized counts."""
     after = count_data(row.after) if optimise else None
     return {"key": row.key, "title": row.title, "before": count_data(row.before), "after": after}
 

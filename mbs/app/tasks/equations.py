@@ -368,7 +368,7 @@ def counts(
 def _row(system: System, key: str, passes: Sequence[str], options: Mapping[str, str]) -> CountRow:
     """Return the operation counts of a model, or the reason why there are none.
 
-    `key` is the model, `passes` are those of the optimizer, `options` are texts of its options.
+    `key` is the model, `passes` are passes of the optimizer, `options` are texts of its options.
     """
     one = entry(key)
     reason = one.refusal(system)

@@ -312,7 +312,7 @@ def _rows(found: Identification) -> tuple[EstimateRow, ...]:
 
 
 def _efforts(residuals: Residuals, tested: Residuals) -> tuple[EffortError, ...]:
-    """Return the errors of the efforts; `tested` are those in the last quarter of the record."""
+    """Return the errors of the efforts; `tested` are the residuals in the last quarter."""
     return tuple(
         EffortError(name, unit, *map(float, numbers))
         for name, unit, *numbers in zip(

@@ -169,7 +169,7 @@ def _verdict(constant: str, factors: Sequence[DeterminantFactor]) -> str:
 def _factor(
     system: System, one: SingularFactor, determinant: Function, start: Array
 ) -> DeterminantFactor:
-    """Return a factor of a determinant with a configuration near `start` where it is zero."""
+    """Return a factor of a determinant and a configuration near `start` that makes it zero."""
     names = [(c.name, c.kind == "revolute") for c in system.coordinates]
     configuration = _zero(system, one.function, start)
     value: float | None = None

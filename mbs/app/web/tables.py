@@ -276,7 +276,7 @@ class TablePanel:
         return rows(self._app.session.shown_tables, document.symbols, sheet, problems)
 
     def _show_message(self, problems: tuple[CellProblem, ...]) -> None:
-        """Show the first error message and the number of further ones."""
+        """Show the first error message and the number of further messages."""
         sentences = [problem.sentence for problem in problems] or [self._app.session.refusal]
         more = f" (and {len(sentences) - 1} more)" if len(sentences) > 1 else ""
         self._sentence.set_text(sentences[0] + more)

@@ -142,7 +142,7 @@ def _headline(made: ConfigurationList) -> str:
 
 
 def _nothing(app: App, made: ConfigurationList) -> None:
-    """Show the reason why there is no configuration, and a button for the nearest one."""
+    """Show the reason why there is no configuration, and a button for the nearest pose."""
     ui.label(made.reason[:1].upper() + made.reason[1:] + ".").mark("reason")
     near = made.nearest
     if near is None:

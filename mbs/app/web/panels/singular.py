@@ -28,7 +28,7 @@ _TEXTS = PanelTexts(
 async def open_singular(app: App) -> None:
     """Open the panel of singular configurations and factor the determinant.
 
-    The options are those that were last chosen.
+    The form shows the options that were chosen last.
 
     Args:
         app: app of the page.

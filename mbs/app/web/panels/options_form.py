@@ -23,8 +23,8 @@ FormValues = dict[str, Any]
 """Values of a form by option: a text, a choice or a list of names. The names in a list that the
 form does not offer are a text "more_..."."""
 
-_NUMBER, _NAMES = "112px", "150px"
-"""Widths of fields, enough for their labels."""
+_WIDTH = "150px"
+"""Width of text fields, enough for the label of an empty field."""
 _CHOICE, _MENU, _LETTER = 160, 46, 7
 """Least width of a choice, and widths of its arrow with margins and of a letter [CSS pixels]."""
 
@@ -83,7 +83,7 @@ def option_form(
             _several(values, name, option, offered.get(name, option.offered))
     with ui.element("div").classes("app-form"):
         for name, option in lists.items():
-            field = _text(values, f"more_{name}", FieldLook(f"More {name}", _NAMES, f"more_{name}"))
+            field = _text(values, f"more_{name}", FieldLook(f"More {name}", _WIDTH, f"more_{name}"))
             field.tooltip(f"such as {option.example.format(joint=joint)}; commas between them")
 
 
@@ -98,7 +98,7 @@ def option_row(options: type, values: FormValues) -> None:
     for name, option in _options_in_form(options, "choice").items():
         choices[name] = _choice(values, name, option)
     for name, option in _options_in_form(options, "number").items():
-        field = _text(values, name, FieldLook(title_of(name, option), _NUMBER, name))
+        field = _text(values, name, FieldLook(title_of(name, option), _WIDTH, name))
         if option.only_with is not None:
             other, needed = option.only_with
             field.bind_visibility_from(choices[other], "value", needed.__contains__)

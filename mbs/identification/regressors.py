@@ -563,11 +563,12 @@ class JointColumns:
         return SX(casadi.dot(self.v, self.remaining_effort(column)))
 
     def _own_effort(self, column: Column, v: SX, a: SX) -> SX:
-        """Return the joint efforts (nv, 1) of a unit parameter that acts on its own joint only.
+        """Return the joint efforts (nv, 1) of a parameter Ia, Fv, Fs or offset of value 1.
 
-        v and a are (nv, 1) joint velocities and accelerations. Coupled motors act on two joints.
+        It acts on the joint of its link, or on two joints if their motors are coupled. The effort
+        has the sign of inverse dynamics: positive if a motor must overcome it.
 
-        `column` is the parameter.
+        `column` is the parameter; v and a are (nv, 1) joint velocities and accelerations.
         """
         link, total = self.tree.links[column.link - 1], zeros(self.tree.nv)
         if column.kind == "offset":

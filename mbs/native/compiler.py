@@ -286,7 +286,11 @@ def _compile(compiler: Compiler, arguments: Sequence[str], sources: Sequence[Pat
 
 
 def _main_error(stderr: str) -> str:
-    """Return the most informative line of `stderr`, the error output of a compiler or linker."""
+    """Return the line of a compiler's error output that names the fault.
+
+    It is the first line with "undefined reference", or else with "error"; all of `stderr` without
+    such a line.
+    """
     lines = stderr.splitlines()
     found = (s for word in ("undefined reference", "error") for s in lines if word in s)
     return next(found, stderr)
